@@ -1,0 +1,82 @@
+"""The one decorator behind every compiled kernel, and the disk cache it uses.
+
+numba finds a stale kernel in its cache when a function that the kernel calls, in another file, was edited. The cache
+directory is therefore named by a hash of every source that can take part: the core, every installed plugin, numba,
+numpy and Python. It belongs to the user alone, since the cached files are pickles.
+"""
+
+import contextlib
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from importlib.metadata import entry_points, version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def _packages() -> Iterator[Path]:
+    names = {"mpad_core"} | {entry.module.partition(".")[0] for entry in entry_points(group="mpad")}
+    for name in sorted(names):
+        spec = find_spec(name)
+        if spec is not None and spec.submodule_search_locations:
+            yield Path(next(iter(spec.submodule_search_locations)))
+
+
+def _fingerprint() -> str:
+    digest = hashlib.sha256(f"{sys.version} {version('numba')} {version('numpy')}".encode())
+    for package in _packages():
+        for source in sorted(package.rglob("*.py")):
+            digest.update(str(source).encode())
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:20]
+
+
+def _cache_directory() -> Path:
+    """Give a directory that exists, is private and can be written; the temporary one where the user's cannot."""
+    home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    wanted = Path(home) / "mpad" / _fingerprint()
+    try:
+        wanted.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if not os.access(wanted, os.W_OK):
+            raise PermissionError(wanted)
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="mpad-numba-"))
+    return wanted
+
+
+os.environ["NUMBA_CACHE_DIR"] = str(_cache_directory())
+import numba  # noqa: E402  (the cache directory must be set before numba reads its configuration)
+
+
+def _forgiving(dispatcher: Any) -> Any:
+    """Make a damaged cache file a cache miss: numba itself ends in an unpickling error."""
+    load = dispatcher._cache.load_overload
+
+    def load_or_recompile(signature: Any, target_context: Any) -> Any:
+        try:
+            return load(signature, target_context)
+        except Exception:  # whatever a damaged pickle raises, the remedy is the same
+            with contextlib.suppress(OSError):
+                dispatcher._cache.flush()
+            return None
+
+    dispatcher._cache.load_overload = load_or_recompile
+    return dispatcher
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a kernel with numba: cached on disk, IEEE arithmetic (no fastmath), numpy's rules for division."""
+    kernel: Callable[P, R] = _forgiving(numba.njit(cache=True, error_model="numpy", nogil=True)(function))
+    return kernel
+
+
+def compiled_parallel(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `compiled` does, with `numba.prange` over all threads: fill arrays, never reduce, so bits stay equal."""
+    kernel: Callable[P, R] = _forgiving(numba.njit(cache=True, error_model="numpy", nogil=True, parallel=True)(function))
+    return kernel
