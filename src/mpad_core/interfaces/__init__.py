@@ -1,0 +1,1 @@
+"""What a part must be: protocols and values; nothing here computes."""

@@ -77,6 +77,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def compiled_parallel(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile as `compiled` does, with `numba.prange` over all threads: fill arrays, never reduce, so bits stay equal."""
-    kernel: Callable[P, R] = _forgiving(numba.njit(cache=True, error_model="numpy", nogil=True, parallel=True)(function))
+    """Compile as `compiled` does, with `numba.prange` over all threads: fill arrays, never reduce (bits stay equal)."""
+    parallel = numba.njit(cache=True, error_model="numpy", nogil=True, parallel=True)
+    kernel: Callable[P, R] = _forgiving(parallel(function))
     return kernel

@@ -1,0 +1,1 @@
+"""What happens to the bodies: state, loads, reactions, motion."""

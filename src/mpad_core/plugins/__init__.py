@@ -1,0 +1,1 @@
+"""How a part is found: by name through entry points, loaded only when a scene names it."""

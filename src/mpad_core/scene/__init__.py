@@ -1,0 +1,1 @@
+"""What the user says: the scene, its file, and how it becomes a problem."""

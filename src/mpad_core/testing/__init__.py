@@ -1,0 +1,1 @@
+"""What a part can prove about itself; shipped to plugin authors."""

@@ -1,0 +1,45 @@
+"""The errors that people see: one clear line, an exit code, never a traceback."""
+
+
+class MpadError(Exception):
+    """What mpad tells its user in one line."""
+
+    exit_code = 70
+
+
+class InputError(MpadError):
+    """Bad input: says where, what is wrong, and what would do. ``lines`` holds one line for each fault."""
+
+    exit_code = 2
+
+    def __init__(self, *lines: str) -> None:
+        super().__init__("\n".join(lines))
+        self.lines = lines
+
+
+class PartError(MpadError):
+    """A part (plugin) failed: names the part and the distribution it came from."""
+
+
+class RefusedError(MpadError):
+    """The numerics refuse to answer: names what could not be treated, and where."""
+
+
+class DiskFullError(MpadError):
+    """No room to record; all recorded so far is kept."""
+
+    exit_code = 74
+
+
+class BusyError(MpadError):
+    """Another process is writing to the run directory."""
+
+    exit_code = 75
+
+
+class InterruptedRunError(MpadError):
+    """The run was told to stop and has written a checkpoint; ``exit_code`` is 128 + the signal's number."""
+
+    def __init__(self, message: str, signal_number: int) -> None:
+        super().__init__(message)
+        self.exit_code = 128 + signal_number

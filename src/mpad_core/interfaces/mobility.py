@@ -1,0 +1,83 @@
+"""What a mobility solver must be."""
+
+from typing import Any, ClassVar, Protocol, runtime_checkable
+
+from mpad_core.interfaces.values import Array, Configuration, Motion, Setting, SolverTraits
+
+
+@runtime_checkable
+class MobilitySolver(Protocol):
+    """Velocities of spheres in Stokes flow under given forces and torques.
+
+    Three verbs, split where their inputs change at different rates: `plan` once a run, `prepare` once a configuration,
+    `solve` once a right-hand side. A solver is a frozen attrs class; its fields are its parameters in the scene. It
+    keeps nothing between calls: what `plan` and `prepare` learn is in what they return.
+    """
+
+    name: ClassVar[str]
+    traits: ClassVar[SolverTraits]
+
+    def plan(self, setting: Setting) -> Any:
+        """Make ready for a run; the place to import heavy modules and to load tables."""
+        ...
+
+    def prepare(self, plan: Any, configuration: Configuration, guess: Array | None = None) -> Any:
+        """Make ready for solves at one configuration.
+
+        Parameters
+        ----------
+        plan
+            What `plan` returned.
+        configuration
+            Centres, radii, and gaps to the wall.
+        guess
+            `Motion.guess` of an earlier solve nearby, to start from. It must not change the answer beyond the
+            solver's tolerance.
+
+        Raises
+        ------
+        RefusedError
+            For a configuration that the solver cannot treat, naming spheres and gap.
+        """
+        ...
+
+    def solve(self, prepared: Any, loads: Array) -> Motion:
+        """Give the velocities of freely moving spheres under `loads` in the ambient flow of the setting.
+
+        Parameters
+        ----------
+        loads : (N, 6) or (N, 6, k)
+            Force (pN) and torque about the centre (pN µm) on each sphere; k right-hand sides at once.
+
+        Returns
+        -------
+        Motion
+            Velocities of the shape of `loads`: the motion of the load-free spheres in the ambient flow, plus the
+            mobility times the loads.
+        """
+        ...
+
+
+@runtime_checkable
+class Fluctuating(Protocol):
+    """A solver that can also drive thermal motion."""
+
+    def root(self, prepared: Any, noise: Array) -> Array:
+        """Apply a root B of the mobility, B·Bᵀ = M, to standard normal noise (N, 6)."""
+        ...
+
+    def drift(self, prepared: Any) -> Array:
+        """Give the divergence of the mobility, ∇·M, as (N, 6)."""
+        ...
+
+
+@runtime_checkable
+class FluidVelocity(Protocol):
+    """A solver that can also tell the velocity of the fluid outside the spheres."""
+
+    def flow(self, prepared: Any, motion: Motion, points: Array) -> Array:
+        """Give the fluid's velocity (n, 3) at points (n, 3)."""
+        ...
+
+
+REQUIRED = ("name", "traits", "plan", "prepare", "solve")

@@ -1,0 +1,106 @@
+"""The values that parts and core hand to each other: frozen, in inner units (µm, s, pN)."""
+
+from typing import Any, TypeAlias
+
+import numpy as np
+from attrs import field, frozen
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+
+BOND_EVENT = np.dtype(
+    [
+        ("time", "f8"),  # s
+        ("step", "i8"),
+        ("kind", "u1"),  # 0 formed, 1 broken
+        ("species", "u1"),  # index into the scene's bonds
+        ("cell", "i4"),
+        ("receptor", "i8"),  # index of the molecule on its cell
+        ("ligand", "i8"),  # identity of the wall's molecule; -1 where the wall's molecules are not told apart
+        ("anchor_x", "f8"),  # µm, where the bond holds the wall
+        ("anchor_y", "f8"),
+        ("length", "f8"),  # µm
+        ("force", "f8"),  # pN
+    ]
+)
+
+
+def _floats(values: Any) -> Array:
+    return np.ascontiguousarray(values, dtype=np.float64)
+
+
+@frozen(kw_only=True)
+class Setting:
+    """What stays the same during a run, as far as the fluid is concerned."""
+
+    viscosity: float  # pN s/µm²
+    shear_rate: float = 0.0  # 1/s; ambient flow u = shear_rate · z · x̂
+    wall: bool = True  # a no-slip wall at z = 0, fluid above
+
+
+@frozen(kw_only=True, eq=False)
+class Configuration:
+    """Where the spheres are.
+
+    The gap to the wall is kept beside the height, since their difference loses digits near contact.
+    """
+
+    centres: Array = field(converter=_floats)  # (N, 3), µm
+    radii: Array = field(converter=_floats)  # (N,), µm
+    wall_gaps: Array = field(converter=_floats)  # (N,), µm; height minus radius, exact near contact
+
+    @wall_gaps.default
+    def _heights_minus_radii(self) -> Array:
+        return self.centres[:, 2] - self.radii
+
+    def part(self, cells: NDArray[np.intp]) -> "Configuration":
+        """Give the configuration of some of the spheres, in the order asked for."""
+        return Configuration(centres=self.centres[cells], radii=self.radii[cells], wall_gaps=self.wall_gaps[cells])
+
+
+@frozen(kw_only=True)
+class Report:
+    """How a solve went.
+
+    ``error`` estimates the relative 2-norm error of (U, a·Ω) over the spheres for this right-hand side.
+    """
+
+    error: float
+    iterations: int = 0
+    residual: float = 0.0
+
+
+@frozen(kw_only=True, eq=False)
+class Motion:
+    """A solver's answer: velocities (N, 6) or (N, 6, k), rows Ux Uy Uz Ωx Ωy Ωz in µm/s and 1/s.
+
+    ``guess`` is whatever lets the next solve start warm; it is stored with the run's state, so it must be an array.
+    """
+
+    velocity: Array
+    report: Report
+    guess: Array | None = None
+
+
+@frozen(kw_only=True)
+class AccuracyLevel:
+    """One setting of a solver and the error it claims there."""
+
+    parameters: tuple[tuple[str, object], ...]
+    error: float
+
+
+@frozen(kw_only=True)
+class SolverTraits:
+    """What a solver can treat, and how well: the core supplies or refuses the rest before step one."""
+
+    wall: bool = True
+    unbounded: bool = True
+    unequal_radii: bool = True
+    torques: bool = True
+    ambient_flow: bool = True
+    coupling: bool = True  # cells feel each other through the fluid
+    lubrication: bool = False  # exact near-contact forces between cells
+    largest_number: int | None = None
+    levels: tuple[AccuracyLevel, ...] = ()
