@@ -68,7 +68,7 @@ def convert(text: object, unit: str) -> float:
 
 
 def to_inner(text: object) -> float:
-    """Read a quantity of any dimension made of length, time, mass and temperature, and give its value in inner units."""
+    """Read a quantity of any dimension made of length, time, mass, temperature; give it in inner units."""
     quantity = _parse(text, '"2 pN/um"')
     powers = dict(quantity.dimensionality)
     strange = sorted(set(powers) - set(_INNER))

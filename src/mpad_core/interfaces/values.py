@@ -1,13 +1,23 @@
 """The values that parts and core hand to each other: frozen, in inner units (µm, s, pN)."""
 
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from attrs import field, frozen
 from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+from mpad_core.arrays import Array
 
+__all__ = [
+    "BOND_EVENT",
+    "AccuracyLevel",
+    "Array",
+    "Configuration",
+    "Motion",
+    "Report",
+    "Setting",
+    "SolverTraits",
+]
 
 BOND_EVENT = np.dtype(
     [

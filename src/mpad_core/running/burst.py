@@ -1,0 +1,138 @@
+"""Many sub-steps between two calls of the solver: react → loads → implicit motion → move, compiled."""
+
+import math
+
+import numpy as np
+
+from mpad_core.arrays import Array, Flags, Indices
+from mpad_core.numerics.compiled import compiled
+from mpad_core.running.layout import Attached, Bonds, Dice, Limits, Motion, System
+from mpad_core.running.moving import DONE, INDEFINITE, TOO_LONG, advance, attach, refresh_turns
+from mpad_core.running.reacting import break_bonds, form_bonds, list_candidates
+
+REACHED, ROOM_NEEDED, NOT_POSITIVE, NO_BALANCE = 0, 1, 2, 3  # why a burst ended
+_TICKS = 1 << 16  # a sub-step is never split finer
+_LISTING_MARGIN = 0.03  # µm: molecules this far out of reach are listed too, and the list stands until they could reach
+
+
+@compiled
+def _reach_height(system: System) -> float:
+    """Give the height below which a molecule can bind."""
+    reach = -math.inf
+    for kind in range(system.species.reach.shape[0]):
+        reach = max(reach, system.species.reach[kind])
+    return system.bodies.wall_tips + reach
+
+
+@compiled
+def _list_all(
+    system: System, motion: Motion, turns: Array, candidates: Indices, first: Indices, slack: Array, lever: Array
+) -> None:
+    """List every cell's candidates; note how much nearer its molecules may come before the list is too short."""
+    lowest = _reach_height(system) + _LISTING_MARGIN
+    at = 0
+    for cell in range(first.shape[0] - 1):
+        first[cell] = at
+        shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
+        bottom = motion.centre[cell, 2] - shell
+        slack[cell] = max(_LISTING_MARGIN, bottom - lowest + _LISTING_MARGIN)
+        depth = min(max(lowest - bottom, 0.0), shell)
+        lever[cell] = math.sqrt(depth * (2 * shell - depth)) + slack[cell]
+        if bottom < lowest:
+            at = list_candidates(cell, lowest, system.molecules, motion.centre[cell, 2], turns[cell], candidates, at)
+    first[first.shape[0] - 1] = at
+
+
+@compiled
+def _list_is_short(dt: float, motion: Motion, slack: Array, lever: Array) -> bool:
+    """Use up the list's slack by the last sub-step's motion; tell whether any is left."""
+    short = False
+    for cell in range(slack.shape[0]):
+        v = motion.velocity[cell]
+        slack[cell] -= dt * (max(-v[2], 0.0) + math.sqrt(v[3] * v[3] + v[4] * v[4]) * lever[cell])
+        short = short or slack[cell] < 0
+    return short
+
+
+@compiled
+def _move_group(group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, turns: Array) -> int:
+    """Move a group over a sub-step, in as many parts as it takes."""
+    left = _TICKS
+    part = _TICKS
+    while left > 0:
+        part = min(part, left)
+        outcome = advance(group, dt * part / _TICKS, system, bonds, attached, motion)
+        if outcome == DONE:
+            left -= part
+            part *= 2
+            if left > 0:
+                refresh_turns(motion, turns)
+                attach(bonds, system.molecules, turns, attached)
+        elif outcome == TOO_LONG and part > 1:
+            part //= 2
+        else:
+            return NOT_POSITIVE if outcome == INDEFINITE else NO_BALANCE
+    return REACHED
+
+
+@compiled
+def _must_end(motion: Motion, start: Array, limits: Limits) -> bool:
+    """Tell whether the frozen coupling has been used far enough."""
+    for cell in range(start.shape[0]):
+        if motion.gap[cell] < limits.gap_low[cell] or motion.gap[cell] > limits.gap_high[cell]:
+            return True
+    for p in range(limits.pairs.shape[0]):
+        i, j = limits.pairs[p, 0], limits.pairs[p, 1]
+        square = 0.0
+        for a in range(3):
+            square += (motion.centre[i, a] - start[i, a] - motion.centre[j, a] + start[j, a]) ** 2
+        if square > limits.pair_move[p] ** 2:
+            return True
+    return False
+
+
+@compiled
+def burst(
+    system: System, bonds: Bonds, bound: Flags, motion: Motion, limits: Limits, dice: Dice, events: Array,
+    event_count: Indices,
+) -> tuple[int, int, int]:  # fmt: skip
+    """Run sub-steps until a limit is met; change `bonds`, `bound`, `motion` and fill `events`.
+
+    Returns
+    -------
+    outcome
+        REACHED; ROOM_NEEDED when bonds or events may not fit another sub-step; NOT_POSITIVE or NO_BALANCE when a
+        sub-step was refused, in which case the state is that of the last whole sub-step but for its reactions.
+    sub_steps
+        How many were done.
+    group
+        The group that was refused.
+    """
+    cells = motion.gap.shape[0]
+    turns = np.empty((cells, 3, 3))
+    candidates = np.empty(system.molecules.kind.shape[0], np.int64)
+    first = np.zeros(cells + 1, np.int64)
+    slack, lever = np.zeros(cells), np.zeros(cells)
+    room = bonds.cell.shape[0]
+    attached = Attached(np.zeros(cells + 1, np.int64), np.zeros(room, np.int64), np.empty((room, 3)))
+    start = motion.centre.copy()
+    groups = system.groups.first.shape[0] - 1
+    dt = limits.sub_step
+    for done in range(limits.most):
+        step = dice.step + done
+        refresh_turns(motion, turns)
+        if done == 0 or _list_is_short(dt, motion, slack, lever):
+            _list_all(system, motion, turns, candidates, first, slack, lever)
+        open_sites = first[cells]
+        if bonds.count[0] + open_sites > room or event_count[0] + bonds.count[0] + open_sites > events.shape[0]:
+            return ROOM_NEEDED, done, -1
+        break_bonds(bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
+        form_bonds(candidates, first, bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
+        attach(bonds, system.molecules, turns, attached)
+        for group in range(groups):
+            outcome = _move_group(group, dt, system, bonds, attached, motion, turns)
+            if outcome != REACHED:
+                return outcome, done, group
+        if _must_end(motion, start, limits):
+            return REACHED, done + 1, -1
+    return REACHED, limits.most, -1

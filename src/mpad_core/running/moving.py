@@ -1,0 +1,312 @@
+"""The implicit motion of one group of cells over one sub-step: items (iii) to (v) of King & Hammer (PNAS 2001), compiled.
+
+Backward Euler for  r_i(h_i) U_i + Σ_j C_ij U_j = F_i + f_i(h_i) + k_i + g_i : bonds and repulsion are taken at the end
+of the sub-step by Newton's method with their full stiffness (taut or slack, geometric), the exact wall resistance r and
+the ambient load f at its start. Semi-implicit short cuts give rolling speeds several times too high.
+"""
+
+import math
+
+import numpy as np
+
+from mpad_core.arrays import Array
+from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.rotations import matrix_of, turned, turned_vector
+from mpad_core.numerics.tables import value_and_slope
+from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
+from mpad_core.running.layout import Attached, Bonds, Molecules, Motion, Species, System
+from mpad_core.running.reacting import TENSION
+
+DONE, TOO_LONG, INDEFINITE = 0, 1, 2
+_MOST_ITERATIONS = 25
+_CLOSE = 1e-8  # µm: Newton has converged when its step moves no surface by more
+_GAP_SHARE = 0.2  # of the gap to the wall that one sub-step may cross
+_LARGEST_TURN = 0.1  # rad in one sub-step
+
+
+@compiled
+def is_positive_definite(matrix: Array) -> bool:
+    """Tell whether a symmetric matrix has a Cholesky factor; the matrix is overwritten."""
+    m = matrix.shape[0]
+    for j in range(m):
+        for k in range(j):
+            for i in range(j, m):
+                matrix[i, j] -= matrix[i, k] * matrix[j, k]
+        if not matrix[j, j] > 0:
+            return False
+        root = math.sqrt(matrix[j, j])
+        for i in range(j, m):
+            matrix[i, j] /= root
+    return True
+
+
+@compiled
+def solve_in_place(matrix: Array, right: Array) -> None:
+    """Solve by Gaussian elimination with partial pivoting; the answer replaces `right`, the matrix is overwritten."""
+    m = matrix.shape[0]
+    for k in range(m):
+        pivot = k
+        for i in range(k + 1, m):
+            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
+                pivot = i
+        if pivot != k:
+            for j in range(k, m):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+            right[k], right[pivot] = right[pivot], right[k]
+        for i in range(k + 1, m):
+            factor = matrix[i, k] / matrix[k, k]
+            if factor != 0.0:
+                for j in range(k + 1, m):
+                    matrix[i, j] -= factor * matrix[k, j]
+                right[i] -= factor * right[k]
+    for k in range(m - 1, -1, -1):
+        for j in range(k + 1, m):
+            right[k] -= matrix[k, j] * right[j]
+        right[k] /= matrix[k, k]
+
+
+@compiled
+def _add_bond(
+    arm: Array, px: float, py: float, pz: float, anchor: Array, kind: int, species: Species,
+    load: Array, stiffness: Array,
+) -> None:  # fmt: skip
+    """Add one bond's load on its cell (6,), and minus the load's derivative by displacement and turn (6, 6)."""
+    bx, by, bz = arm[0], arm[1], arm[2]
+    dx, dy, dz = px - anchor[0], py - anchor[1], pz - anchor[2]
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    tension, slope = value_and_slope(species.tables, kind, TENSION, length)
+    if (tension == 0.0 and slope == 0.0) or length == 0.0:
+        return
+    n = (dx / length, dy / length, dz / length)
+    force = (-tension * n[0], -tension * n[1], -tension * n[2])
+    for i in range(3):
+        load[i] += force[i]
+    load[3] += by * force[2] - bz * force[1]
+    load[4] += bz * force[0] - bx * force[2]
+    load[5] += bx * force[1] - by * force[0]
+    side = tension / length
+    cross = ((0.0, -bz, by), (bz, 0.0, -bx), (-by, bx, 0.0))  # [b]x
+    pull = ((0.0, -force[2], force[1]), (force[2], 0.0, -force[0]), (-force[1], force[0], 0.0))  # [F]x
+    for i in range(3):
+        for j in range(3):
+            k_ij = (slope - side) * n[i] * n[j] + (side if i == j else 0.0)
+            stiffness[i, j] += k_ij
+            for m in range(3):
+                # the molecule moves by δx − [b]x δθ
+                stiffness[i, 3 + m] -= k_ij * cross[j][m]
+                stiffness[3 + m, j] += cross[m][i] * k_ij
+    for i in range(3):
+        for m in range(3):
+            total = 0.0
+            for j in range(3):
+                total -= pull[i][j] * cross[j][m]  # the arm itself turns with the cell
+                for l in range(3):
+                    total -= cross[i][j] * ((slope - side) * n[j] * n[l] + (side if j == l else 0.0)) * cross[l][m]
+            stiffness[3 + i, 3 + m] += total
+
+
+@compiled
+def _add_wall_contact(cell: int, shift: float, system: System, gap: Array, load: Array, stiffness: Array) -> None:
+    """Add the repulsion between a cell's bumps and the wall's."""
+    tip_gap = gap[cell] + shift - system.bodies.roughness[cell] - system.bodies.wall_tips
+    if tip_gap < system.contacts.reach:
+        force, slope = value_and_slope(system.contacts.law, 0, 0, tip_gap)
+        load[2] += force
+        stiffness[2, 2] -= slope
+
+
+@compiled
+def _add_pair_contact(
+    i: int, j: int, moved: Array, system: System, motion: Motion, load: Array, stiffness: Array
+) -> None:
+    """Add the repulsion between the bumps of two cells; a place of -1 is a held cell, which takes no load."""
+    bodies, contacts = system.bodies, system.contacts
+    at_i, at_j = system.groups.place[i], system.groups.place[j]
+    dx = motion.centre[i, 0] - motion.centre[j, 0]
+    dy = motion.centre[i, 1] - motion.centre[j, 1]
+    dz = motion.centre[i, 2] - motion.centre[j, 2]
+    for place, sign in ((at_i, 1.0), (at_j, -1.0)):
+        if place >= 0:
+            dx += sign * moved[6 * place]
+            dy += sign * moved[6 * place + 1]
+            dz += sign * moved[6 * place + 2]
+    distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+    tip_gap = distance - bodies.radius[i] - bodies.radius[j] - bodies.roughness[i] - bodies.roughness[j]
+    if tip_gap >= contacts.reach:
+        return
+    force, slope = value_and_slope(contacts.law, 0, 0, tip_gap)
+    n = (dx / distance, dy / distance, dz / distance)
+    for place, sign in ((at_i, 1.0), (at_j, -1.0)):
+        if place < 0:
+            continue
+        for a in range(3):
+            load[6 * place + a] += sign * force * n[a]
+            for b in range(3):
+                k_ab = -(slope - force / distance) * n[a] * n[b] - (force / distance if a == b else 0.0)
+                stiffness[6 * place + a, 6 * place + b] += k_ab
+                other = at_j if place == at_i else at_i
+                if other >= 0:
+                    stiffness[6 * place + a, 6 * other + b] -= k_ab
+
+
+@compiled
+def _add_loads(
+    group: int, moved: Array, system: System, bonds: Bonds, attached: Attached, motion: Motion,
+    load: Array, stiffness: Array,
+) -> None:  # fmt: skip
+    """Add all loads but the fluid's, and their stiffness, for the group displaced and turned by `moved` (6n,)."""
+    groups, contacts = system.groups, system.contacts
+    start = groups.first[group]
+    arm = np.empty(3)
+    for place in range(groups.first[group + 1] - start):
+        cell = groups.cells[start + place]
+        o = 6 * place
+        own, own_stiffness = load[o : o + 6], stiffness[o : o + 6, o : o + 6]
+        own += system.bodies.external[cell]
+        _add_wall_contact(cell, moved[o + 2], system, motion.gap, own, own_stiffness)
+        for b in range(attached.first[cell], attached.first[cell + 1]):
+            a = attached.arm[b]
+            arm[0], arm[1], arm[2] = turned_vector(a[0], a[1], a[2], moved[o + 3], moved[o + 4], moved[o + 5])
+            x = motion.centre[cell, 0] + moved[o] + arm[0]
+            y = motion.centre[cell, 1] + moved[o + 1] + arm[1]
+            z = motion.centre[cell, 2] + moved[o + 2] + arm[2]
+            bond = attached.order[b]
+            _add_bond(arm, x, y, z, bonds.anchor[bond], bonds.species[bond], system.species, own, own_stiffness)
+    for p in range(contacts.pair_first[group], contacts.pair_first[group + 1]):
+        _add_pair_contact(contacts.pairs[p, 0], contacts.pairs[p, 1], moved, system, motion, load, stiffness)
+
+
+@compiled
+def attach(bonds: Bonds, molecules: Molecules, turns: Array, out: Attached) -> None:
+    """Sort the living bonds by cell, oldest first, and turn their arms into space."""
+    cells = out.first.shape[0] - 1
+    out.first[:] = 0
+    for bond in range(bonds.count[0]):
+        out.first[bonds.cell[bond] + 1] += 1
+    for cell in range(cells):
+        out.first[cell + 1] += out.first[cell]
+    at = out.first[:cells].copy()
+    for bond in range(bonds.count[0]):
+        cell = bonds.cell[bond]
+        b = at[cell]
+        at[cell] += 1
+        out.order[b] = bond
+        turn = turns[cell]
+        arm = molecules.arm[bonds.site[bond]]
+        for i in range(3):
+            out.arm[b, i] = turn[i, 0] * arm[0] + turn[i, 1] * arm[1] + turn[i, 2] * arm[2]
+
+
+@compiled
+def _resistance(group: int, system: System, motion: Motion, matrix: Array, right: Array) -> None:
+    """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at the present heights."""
+    bodies, groups = system.bodies, system.groups
+    start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
+    size = 36 * n * n
+    offset = groups.coupling_first[group]
+    matrix[:, :] = groups.coupling[offset : offset + size].reshape(6 * n, 6 * n)
+    own = np.empty((6, 6))
+    ambient = np.empty(6)
+    for place in range(n):
+        cell = groups.cells[start + place]
+        o = 6 * place
+        radius = bodies.radius[cell]
+        height = motion.gap[cell] + radius
+        felt = motion.gap[cell] + bodies.wall_offset
+        wall_resistance(height, felt, radius, bodies.viscosity, own)
+        wall_shear_load(height, felt, radius, bodies.viscosity, bodies.shear_rate, ambient)
+        matrix[o : o + 6, o : o + 6] += own
+        right[o : o + 6] = ambient + groups.load[cell]
+
+
+@compiled
+def _largest_move(change: Array, dt: float, radii: Array) -> float:
+    """Give the largest displacement of a surface that a change of the velocities makes in dt."""
+    largest = 0.0
+    for i in range(change.shape[0]):
+        lever = 1.0 if i % 6 < 3 else radii[i // 6]
+        largest = max(largest, abs(change[i]) * dt * lever)
+    return largest
+
+
+@compiled
+def _newton(
+    group: int, dt: float, matrix: Array, right: Array, system: System, bonds: Bonds, attached: Attached,
+    motion: Motion, velocity: Array, load: Array,
+) -> bool:  # fmt: skip
+    """Solve for the velocities (6n,) at which fluid and loads balance at the sub-step's end; tell whether it did."""
+    m = velocity.shape[0]
+    groups = system.groups
+    radii = system.bodies.radius[groups.cells[groups.first[group] : groups.first[group + 1]]]
+    stiffness = np.empty((m, m))
+    residual = np.empty(m)
+    step = np.zeros(m)
+    best = np.inf
+    share = 1.0
+    for _ in range(_MOST_ITERATIONS):
+        load[:] = 0.0
+        stiffness[:, :] = 0.0
+        _add_loads(group, dt * velocity, system, bonds, attached, motion, load, stiffness)
+        norm = 0.0
+        for i in range(m):
+            residual[i] = right[i] + load[i]
+            for j in range(m):
+                residual[i] -= matrix[i, j] * velocity[j]
+            norm += (residual[i] / (1.0 if i % 6 < 3 else radii[i // 6])) ** 2
+        if not norm < 1e60:
+            return False
+        if norm > best and share > 0.01:  # went too far: take half of that step back
+            share *= 0.5
+            velocity -= share * step
+            continue
+        best = norm
+        share = 1.0
+        for i in range(m):
+            for j in range(m):
+                stiffness[i, j] = matrix[i, j] + dt * stiffness[i, j]
+        step[:] = residual
+        solve_in_place(stiffness, step)
+        velocity += step
+        if _largest_move(step, dt, radii) < _CLOSE:
+            return True
+    return False
+
+
+@compiled
+def advance(
+    group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion
+) -> int:
+    """Move a group over dt; give DONE, or what stopped it, in which case nothing has changed."""
+    groups = system.groups
+    start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
+    matrix = np.empty((6 * n, 6 * n))
+    right, load, velocity = np.empty(6 * n), np.empty(6 * n), np.empty(6 * n)
+    _resistance(group, system, motion, matrix, right)
+    if not is_positive_definite(matrix.copy()):
+        return INDEFINITE
+    for place in range(n):
+        velocity[6 * place : 6 * place + 6] = motion.velocity[groups.cells[start + place]]
+    if not _newton(group, dt, matrix, right, system, bonds, attached, motion, velocity, load):
+        return TOO_LONG
+    for place in range(n):
+        gap = motion.gap[groups.cells[start + place]]
+        if -velocity[6 * place + 2] * dt > _GAP_SHARE * (gap + system.bodies.wall_offset):
+            return TOO_LONG
+        if math.sqrt(np.sum(velocity[6 * place + 3 : 6 * place + 6] ** 2)) * dt > _LARGEST_TURN:
+            return TOO_LONG
+    for place in range(n):
+        cell = groups.cells[start + place]
+        own = velocity[6 * place : 6 * place + 6]
+        motion.velocity[cell] = own
+        motion.centre[cell] += dt * own[:3]
+        motion.gap[cell] += dt * own[2]
+        turned(motion.orientation[cell], dt * own[3], dt * own[4], dt * own[5], motion.orientation[cell])
+        motion.impulse[cell] += dt * load[6 * place : 6 * place + 6]
+    return DONE
+
+
+@compiled
+def refresh_turns(motion: Motion, turns: Array) -> None:
+    """Write the rotation matrices of all cells."""
+    for cell in range(turns.shape[0]):
+        matrix_of(motion.orientation[cell], turns[cell])
