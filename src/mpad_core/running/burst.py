@@ -7,7 +7,7 @@ import numpy as np
 from mpad_core.arrays import Array, Flags, Indices
 from mpad_core.numerics.compiled import compiled
 from mpad_core.running.layout import Attached, Bonds, Dice, Limits, Motion, System
-from mpad_core.running.moving import DONE, INDEFINITE, TOO_LONG, advance, attach, refresh_turns
+from mpad_core.running.moving import DONE, TOO_LONG, advance, attach, is_positive_definite, refresh_turns, resistance
 from mpad_core.running.reacting import break_bonds, form_bonds, list_candidates
 
 REACHED, ROOM_NEEDED, NOT_POSITIVE, NO_BALANCE = 0, 1, 2, 3  # why a burst ended
@@ -55,7 +55,9 @@ def _list_is_short(dt: float, motion: Motion, slack: Array, lever: Array) -> boo
 
 
 @compiled
-def _move_group(group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, turns: Array) -> int:
+def _move_group(
+    group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, turns: Array
+) -> int:
     """Move a group over a sub-step, in as many parts as it takes."""
     left = _TICKS
     part = _TICKS
@@ -71,7 +73,7 @@ def _move_group(group: int, dt: float, system: System, bonds: Bonds, attached: A
         elif outcome == TOO_LONG and part > 1:
             part //= 2
         else:
-            return NOT_POSITIVE if outcome == INDEFINITE else NO_BALANCE
+            return NO_BALANCE
     return REACHED
 
 
@@ -92,6 +94,18 @@ def _must_end(motion: Motion, start: Array, limits: Limits) -> bool:
 
 
 @compiled
+def _refused_group(system: System, motion: Motion) -> int:
+    """Give the first group whose frozen coupling no longer fits its heights; -1 if all do."""
+    for group in range(system.groups.first.shape[0] - 1):
+        m = 6 * (system.groups.first[group + 1] - system.groups.first[group])
+        matrix, right = np.empty((m, m)), np.empty(m)
+        resistance(group, system, motion, matrix, right)
+        if not is_positive_definite(matrix):
+            return group
+    return -1
+
+
+@compiled
 def burst(
     system: System, bonds: Bonds, bound: Flags, motion: Motion, limits: Limits, dice: Dice, events: Array,
     event_count: Indices,
@@ -101,8 +115,9 @@ def burst(
     Returns
     -------
     outcome
-        REACHED; ROOM_NEEDED when bonds or events may not fit another sub-step; NOT_POSITIVE or NO_BALANCE when a
-        sub-step was refused, in which case the state is that of the last whole sub-step but for its reactions.
+        REACHED; ROOM_NEEDED when bonds or events may not fit another sub-step, NOT_POSITIVE when the frozen coupling
+        no longer fits: both before anything of that sub-step was done; NO_BALANCE when no sub-step however short
+        balances the loads, which leaves the state unusable.
     sub_steps
         How many were done.
     group
@@ -124,8 +139,11 @@ def burst(
         if done == 0 or _list_is_short(dt, motion, slack, lever):
             _list_all(system, motion, turns, candidates, first, slack, lever)
         open_sites = first[cells]
-        if bonds.count[0] + open_sites > room or event_count[0] + bonds.count[0] + open_sites > events.shape[0]:
+        if bonds.living[0] + open_sites > room or event_count[0] + bonds.living[0] + open_sites > events.shape[0]:
             return ROOM_NEEDED, done, -1
+        unfit = _refused_group(system, motion)
+        if unfit >= 0:
+            return NOT_POSITIVE, done, unfit
         break_bonds(bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
         form_bonds(candidates, first, bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
         attach(bonds, system.molecules, turns, attached)

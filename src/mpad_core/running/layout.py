@@ -28,6 +28,7 @@ class Molecules(NamedTuple):
     arm: Array  # (S, 3) µm, from the cell's centre to the molecule, in the cell's frame
     first: Indices  # (N + 1,) each cell's first molecule
     kind: Indices  # (S,) which kind of site
+    owner: Indices  # (N,) each cell's identity in draws, which does not depend on the other cells
 
 
 class Species(NamedTuple):
@@ -44,7 +45,7 @@ class Species(NamedTuple):
 class Bonds(NamedTuple):
     """Living bonds, in the order of their birth; room for B."""
 
-    count: Indices  # (1,)
+    living: Indices  # (1,) how many
     cell: Indices  # (B,)
     site: Indices  # (B,) index into Molecules
     species: Indices  # (B,)

@@ -1,4 +1,4 @@
-"""The implicit motion of one group of cells over one sub-step: items (iii) to (v) of King & Hammer (PNAS 2001), compiled.
+"""The implicit motion of one group of cells over a sub-step: items (iii) to (v) of King & Hammer (PNAS 2001), compiled.
 
 Backward Euler for  r_i(h_i) U_i + Σ_j C_ij U_j = F_i + f_i(h_i) + k_i + g_i : bonds and repulsion are taken at the end
 of the sub-step by Newton's method with their full stiffness (taut or slack, geometric), the exact wall resistance r and
@@ -17,7 +17,7 @@ from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
 from mpad_core.running.layout import Attached, Bonds, Molecules, Motion, Species, System
 from mpad_core.running.reacting import TENSION
 
-DONE, TOO_LONG, INDEFINITE = 0, 1, 2
+DONE, TOO_LONG = 0, 1
 _MOST_ITERATIONS = 25
 _CLOSE = 1e-8  # µm: Newton has converged when its step moves no surface by more
 _GAP_SHARE = 0.2  # of the gap to the wall that one sub-step may cross
@@ -100,8 +100,8 @@ def _add_bond(
             total = 0.0
             for j in range(3):
                 total -= pull[i][j] * cross[j][m]  # the arm itself turns with the cell
-                for l in range(3):
-                    total -= cross[i][j] * ((slope - side) * n[j] * n[l] + (side if j == l else 0.0)) * cross[l][m]
+                for k in range(3):
+                    total -= cross[i][j] * ((slope - side) * n[j] * n[k] + (side if j == k else 0.0)) * cross[k][m]
             stiffness[3 + i, 3 + m] += total
 
 
@@ -181,12 +181,12 @@ def attach(bonds: Bonds, molecules: Molecules, turns: Array, out: Attached) -> N
     """Sort the living bonds by cell, oldest first, and turn their arms into space."""
     cells = out.first.shape[0] - 1
     out.first[:] = 0
-    for bond in range(bonds.count[0]):
+    for bond in range(bonds.living[0]):
         out.first[bonds.cell[bond] + 1] += 1
     for cell in range(cells):
         out.first[cell + 1] += out.first[cell]
     at = out.first[:cells].copy()
-    for bond in range(bonds.count[0]):
+    for bond in range(bonds.living[0]):
         cell = bonds.cell[bond]
         b = at[cell]
         at[cell] += 1
@@ -198,7 +198,7 @@ def attach(bonds: Bonds, molecules: Molecules, turns: Array, out: Attached) -> N
 
 
 @compiled
-def _resistance(group: int, system: System, motion: Motion, matrix: Array, right: Array) -> None:
+def resistance(group: int, system: System, motion: Motion, matrix: Array, right: Array) -> None:
     """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at the present heights."""
     bodies, groups = system.bodies, system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
@@ -273,17 +273,13 @@ def _newton(
 
 
 @compiled
-def advance(
-    group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion
-) -> int:
+def advance(group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion) -> int:
     """Move a group over dt; give DONE, or what stopped it, in which case nothing has changed."""
     groups = system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
     matrix = np.empty((6 * n, 6 * n))
     right, load, velocity = np.empty(6 * n), np.empty(6 * n), np.empty(6 * n)
-    _resistance(group, system, motion, matrix, right)
-    if not is_positive_definite(matrix.copy()):
-        return INDEFINITE
+    resistance(group, system, motion, matrix, right)
     for place in range(n):
         velocity[6 * place : 6 * place + 6] = motion.velocity[groups.cells[start + place]]
     if not _newton(group, dt, matrix, right, system, bonds, attached, motion, velocity, load):

@@ -85,13 +85,11 @@ def break_bonds(
     """Test every living bond for rupture; those that stay keep their order."""
     molecules, species = system.molecules, system.species
     kept = 0
-    for bond in range(bonds.count[0]):
+    for bond in range(bonds.living[0]):
         kind = bonds.species[bond]
         length = length_of(bond, bonds, molecules, motion, turns)
         chance = -math.expm1(-value(species.tables, kind, OFF_RATE, length) * dt)
-        who = np.uint64(bonds.cell[bond]) << np.uint64(32) | np.uint64(
-            bonds.site[bond] - molecules.first[bonds.cell[bond]]
-        )
+        who = mixed(molecules.owner[bonds.cell[bond]], bonds.site[bond] - molecules.first[bonds.cell[bond]])
         if uniform(dice.key, _RUPTURE, who, step) < chance:
             record(events, event_count, 1, bond, bonds, molecules, species, length, step)
             bound[bonds.site[bond]] = 0
@@ -102,13 +100,13 @@ def break_bonds(
         bonds.ligand[kept] = bonds.ligand[bond]
         bonds.anchor[kept] = bonds.anchor[bond]
         kept += 1
-    bonds.count[0] = kept
+    bonds.living[0] = kept
 
 
 @compiled
 def _bind(bonds: Bonds, cell: int, site: int, kind: int, ligand: int, x: float, y: float, z: float) -> int:
     """Append a bond; give its index."""
-    bond = bonds.count[0]
+    bond = int(bonds.living[0])
     bonds.cell[bond] = cell
     bonds.site[bond] = site
     bonds.species[bond] = kind
@@ -116,7 +114,7 @@ def _bind(bonds: Bonds, cell: int, site: int, kind: int, ligand: int, x: float, 
     bonds.anchor[bond, 0] = x
     bonds.anchor[bond, 1] = y
     bonds.anchor[bond, 2] = z
-    bonds.count[0] = bond + 1
+    bonds.living[0] = bond + 1
     return bond
 
 
@@ -140,10 +138,15 @@ def _bind_anywhere(
 
 
 @compiled
+def _square_of(i: int, j: int) -> int:
+    """Give the identity of a square of the wall; its last eight bits are free for the molecule's number."""
+    return int((np.int64(i) & 0xFFFFFF) << 32 | (np.int64(j) & 0xFFFFFF) << 8)
+
+
+@compiled
 def ligands_of(key: int, kind: int, i: int, j: int, density: float) -> int:
     """Give the number of the wall's molecules in a square: Poisson, by inversion."""
-    square = (np.uint64(i) & np.uint64(0xFFFFFF)) << np.uint64(32) | (np.uint64(j) & np.uint64(0xFFFFFF)) << np.uint64(8)
-    u = uniform(key, _LIGANDS, mixed(square, kind), 0)
+    u = uniform(key, _LIGANDS, mixed(_square_of(i, j), kind), 0)
     chance = math.exp(-density * SQUARE * SQUARE)
     total = chance
     number = 0
@@ -156,10 +159,10 @@ def ligands_of(key: int, kind: int, i: int, j: int, density: float) -> int:
 
 @compiled
 def _is_taken(bonds: Bonds, kind: int, ligand: int) -> bool:
-    for bond in range(bonds.count[0]):
-        if bonds.ligand[bond] == ligand and bonds.species[bond] == kind:
-            return True
-    return False
+    taken = False
+    for bond in range(bonds.living[0]):
+        taken = taken or (bonds.ligand[bond] == ligand and bonds.species[bond] == kind)
+    return taken
 
 
 @compiled
@@ -173,7 +176,7 @@ def _bind_pairs(
     for i in range(math.floor((x - lateral) / SQUARE), math.floor((x + lateral) / SQUARE) + 1):
         for j in range(math.floor((y - lateral) / SQUARE), math.floor((y + lateral) / SQUARE) + 1):
             number = ligands_of(dice.key, kind, i, j, species.ligand_density[kind])
-            square = (np.int64(i) & 0xFFFFFF) << 32 | (np.int64(j) & 0xFFFFFF) << 8
+            square = _square_of(i, j)
             for k in range(number):
                 u, v = uniform_pair(dice.key, _LIGANDS, mixed(square, kind), 1 + k)
                 lx, ly = (i + u) * SQUARE, (j + v) * SQUARE
@@ -203,7 +206,7 @@ def form_bonds(
                 continue
             x, y, z = place_of(site, cell, molecules, motion, turns[cell])
             gap = z - tips
-            who = np.uint64(cell) << np.uint64(32) | np.uint64(site - molecules.first[cell])
+            who = mixed(molecules.owner[cell], site - molecules.first[cell])
             for kind in range(species.site_kind.shape[0]):
                 if molecules.kind[site] != species.site_kind[kind] or gap > species.reach[kind]:
                     continue

@@ -1,0 +1,1 @@
+"""Surfaces and the contact between them; one module a part."""

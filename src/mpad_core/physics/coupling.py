@@ -1,0 +1,198 @@
+"""The coupling of the cells through the fluid, frozen at the level of resistance.
+
+For a group of cells a solver's mobility M and its free velocities V give R = M⁻¹. What is kept for a while is
+C = R − blockdiag(r_i) and k = R V − f, where r_i and f are a lone cell's exact resistance and ambient load: those are
+followed at the current height. Held cells are struck from R, not from M. For what lies outside a group, g is the load
+that makes the frozen equation give the full solve's velocities under the present mean loads. A frozen velocity could
+push a cell through the wall; a frozen load cannot.
+"""
+
+from typing import Any, Protocol
+
+import numpy as np
+from attrs import frozen
+from scipy.linalg import cho_factor, cho_solve
+
+from mpad_core.arrays import Array, Indices
+from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.mobility import MobilitySolver
+from mpad_core.interfaces.values import Configuration, Motion, Setting
+from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
+from mpad_core.physics.problem import Problem
+from mpad_core.physics.questions import constrained_motion, unit_load
+
+LARGEST_GROUP = 8  # cells: a burst's cost grows with the cube
+NOT_FELT = 1e12  # radii: the wall functions are those of an unbounded fluid to the last bit at this gap
+_REACHES = (np.inf, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group
+
+
+@frozen(kw_only=True, eq=False)
+class Coupling:
+    """The frozen coupling of the free cells, group by group."""
+
+    groups: tuple[Indices, ...]  # cells of each group
+    matrices: tuple[Array, ...]  # (6n, 6n) each: C
+    loads: Array  # (N, 6): k + g
+    guess: Array | None = None
+    error: float = 0.0  # the solver's own estimate
+
+
+class Coupler(Protocol):
+    """Gives the coupling at a configuration."""
+
+    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
+        """Give the coupling there; `mean_loads` (N, 6) are those under which distant cells are felt."""
+        ...
+
+
+def lone_cell(setting: Setting, radius: float, height: float, gap: float) -> tuple[Array, Array]:
+    """Give a lone cell's exact resistance (6, 6) and ambient load (6,)."""
+    resistance, load = np.empty((6, 6)), np.empty(6)
+    felt = gap if setting.wall else gap + NOT_FELT * radius
+    wall_resistance(height, felt, radius, setting.viscosity, resistance)
+    wall_shear_load(height, felt, radius, setting.viscosity, setting.shear_rate, load)
+    return resistance, load
+
+
+def free_motion(
+    solver: MobilitySolver, plan: Any, setting: Setting, configuration: Configuration, speed: float
+) -> tuple[Array, Array, Motion]:
+    """Ask a solver for mobility (6n, 6n), symmetrised, and free velocities (6n,), in one block of solves.
+
+    Loads are such as give velocities of about `speed` (µm/s), so that taking the free velocities away again loses no
+    digits.
+    """
+    n = len(configuration.radii)
+    size = np.tile(unit_load(setting.viscosity, float(configuration.radii.max()), speed), n)
+    loads = np.zeros((6 * n, 6 * n + 1))
+    loads[:, :-1] = np.diag(size)
+    motion = solver.solve(solver.prepare(plan, configuration), loads.reshape(n, 6, 6 * n + 1))
+    answer = motion.velocity.reshape(6 * n, 6 * n + 1)
+    mobility = (answer[:, :-1] - answer[:, -1:]) / size
+    return 0.5 * (mobility + mobility.T), answer[:, -1].copy(), motion
+
+
+@frozen(kw_only=True, eq=False)
+class NoCoupling:
+    """The null object: every cell alone, which the wall functions treat exactly."""
+
+    problem: Problem
+
+    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
+        """Give zero, every free cell its own group."""
+        free = np.flatnonzero(~self.problem.held)
+        zero = np.zeros((6, 6))
+        return Coupling(
+            groups=tuple(free[i : i + 1] for i in range(len(free))),
+            matrices=tuple(zero for _ in free),
+            loads=np.zeros((len(self.problem.radii), 6)),
+        )
+
+
+def group_cells(configuration: Configuration, held: Any, touching: float) -> tuple[Indices, ...]:
+    """Put free cells into groups: all of them where they are few, else those linked by small gaps.
+
+    Cells nearer than `touching` (µm) share a group whatever its size, since their contact must be solved together.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    free = np.flatnonzero(~np.asarray(held))
+    between = configuration.centres[free][:, None] - configuration.centres[free][None]
+    radii = configuration.radii[free]
+    gaps = np.linalg.norm(between, axis=2) - radii[:, None] - radii[None]
+    labels = np.zeros(len(free), np.int32)
+    for reach in (*_REACHES, 0.0):
+        near = gaps <= max(reach * float(configuration.radii.max()), touching)
+        labels = connected_components(near, directed=False)[1]
+        if len(free) == 0 or np.bincount(labels).max() <= LARGEST_GROUP:
+            break
+    return tuple(free[labels == label] for label in range(labels.max() + 1 if len(free) else 0))
+
+
+@frozen(kw_only=True, eq=False)
+class SolverCoupling:
+    """The coupling as the scene's solver has it."""
+
+    problem: Problem
+    plan: Any
+    speed: float  # µm/s, typical of the problem
+    touching: float  # µm, smooth gap below which cells may be in contact
+
+    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
+        """Solve each group with the held cells; account for all that lies outside by one full solve.
+
+        Raises
+        ------
+        RefusedError
+            If the solver's mobility is not positive definite, or not finite.
+        """
+        problem = self.problem
+        held = np.flatnonzero(problem.held)
+        groups = group_cells(configuration, problem.held, self.touching)
+        loads = np.zeros((len(problem.radii), 6))
+        matrices, resistances, errors = [], [], [0.0]
+        for group in groups:
+            members = np.concatenate([group, held])
+            resistance, free, error = self._resistance(configuration.part(members), members)
+            own = 6 * len(group)
+            for place, cell in enumerate(group):
+                lone, ambient = self._lone(configuration, cell)
+                o = 6 * place
+                loads[cell] = resistance[o : o + 6] @ free - ambient
+                resistance[o : o + 6, o : o + 6] -= lone
+            matrices.append(np.ascontiguousarray(resistance[:own, :own]))
+            resistances.append(resistance)
+            errors.append(error)
+        if len(groups) > 1:
+            guess = self._add_outside(configuration, groups, matrices, loads, mean_loads, guess)
+        return Coupling(groups=groups, matrices=tuple(matrices), loads=loads, guess=guess, error=max(errors))
+
+    def _lone(self, configuration: Configuration, cell: int) -> tuple[Array, Array]:
+        height = float(configuration.centres[cell, 2])
+        gap = float(configuration.wall_gaps[cell])
+        return lone_cell(self.problem.setting, float(configuration.radii[cell]), height, gap)
+
+    def _resistance(self, configuration: Configuration, members: Indices) -> tuple[Array, Array, float]:
+        mobility, free, motion = free_motion(
+            self.problem.solver, self.plan, self.problem.setting, configuration, self.speed
+        )
+        try:
+            resistance = cho_solve(cho_factor(mobility), np.eye(len(mobility)))
+        except (np.linalg.LinAlgError, ValueError) as error:
+            names = ", ".join(self.problem.names[i] for i in members)
+            solver = self.problem.solver.name
+            raise RefusedError(f"solver {solver!r}: mobility of {names} is not positive definite ({error})") from error
+        return 0.5 * (resistance + resistance.T), free, motion.report.error
+
+    def _add_outside(
+        self, configuration: Configuration, groups: tuple[Indices, ...], matrices: list[Array], loads: Array,
+        mean_loads: Array, guess: Array | None,
+    ) -> Array | None:  # fmt: skip
+        """Add g to the loads of every group; give the solver's next guess."""
+        prepared = self.problem.solver.prepare(self.plan, configuration, guess)
+        held = np.flatnonzero(self.problem.held)
+        unit = unit_load(self.problem.setting.viscosity, float(configuration.radii.max()), self.speed)
+        motion = constrained_motion(self.problem.solver, prepared, mean_loads, held, unit)
+        for group, matrix in zip(groups, matrices, strict=True):
+            coupled = (matrix @ motion.velocity[group].ravel()).reshape(-1, 6)
+            for place, cell in enumerate(group):
+                lone, ambient = self._lone(configuration, cell)
+                wanted = lone @ motion.velocity[cell] + coupled[place]
+                loads[cell] = wanted - mean_loads[cell] - ambient
+        return motion.guess
+
+
+def coupler(problem: Problem) -> Coupler:
+    """Give the coupler of a problem; the solver's plan is made here, once a run."""
+    if not problem.coupled:
+        return NoCoupling(problem=problem)
+    touching = 2 * float(problem.roughness.max()) + (problem.contact.gaps()[1] if problem.contact else 0.0)
+    plan = problem.solver.plan(problem.setting)
+    return SolverCoupling(problem=problem, plan=plan, speed=typical_speed(problem), touching=1.2 * touching)
+
+
+def typical_speed(problem: Problem) -> float:
+    """Give a speed (µm/s) typical of the problem: of the flow past a cell or of settling, whichever is larger."""
+    radius = float(problem.radii.max())
+    settling = np.linalg.norm(problem.external[:, :3], axis=1) / (6 * np.pi * problem.setting.viscosity * problem.radii)
+    return float(max(abs(problem.setting.shear_rate) * radius, settling.max(), 1e-6 * radius))
