@@ -4,6 +4,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+
 from mpad_core.records.hdf5 import TrajectoryWriter
 
 TOY = Path(__file__).with_name("toy_run.py")

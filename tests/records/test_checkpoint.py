@@ -3,6 +3,7 @@ import zipfile
 
 import numpy as np
 import pytest
+
 from mpad_core.interfaces.errors import InputError
 from mpad_core.records.checkpoint import FORMAT_ENTRY, read_checkpoint, write_checkpoint
 
@@ -53,8 +54,8 @@ def test_until_the_new_one_is_whole_the_old_one_stands(failing, path, monkeypatc
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(failing, interrupted)
+    monkeypatch.setattr(failing, interrupted)
+    with pytest.raises(KeyboardInterrupt):
         write_checkpoint(path, {"step": np.array(2)})
     assert int(read_checkpoint(path)["step"]) == 1
     assert os.listdir(path.parent) == [path.name]

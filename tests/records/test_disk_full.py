@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from mpad_core.interfaces.errors import DiskFullError
 from mpad_core.records import hdf5, room, salvage
 from mpad_core.records.checkpoint import read_checkpoint, write_checkpoint
@@ -38,7 +39,16 @@ except DiskFullError as error:
 
 
 def fill(path, limit=0):
-    command = [sys.executable, "-W", "error", "-c", FILL, str(Path(__file__).with_name("toy_run.py")), str(path), str(limit)]
+    command = [
+        sys.executable,
+        "-W",
+        "error",
+        "-c",
+        FILL,
+        str(Path(__file__).with_name("toy_run.py")),
+        str(path),
+        str(limit),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert (done.returncode, done.stderr) == (74, f"{path}: disk full\n")
     return int(done.stdout.split()[-1])
@@ -56,7 +66,9 @@ def test_a_file_that_can_grow_no_more_keeps_every_flushed_frame(tmp_path):
 
 
 def test_a_full_file_system_keeps_every_flushed_frame(tmp_path):
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=512k", "tmpfs", tmp_path], capture_output=True, check=False)
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=512k", "tmpfs", tmp_path], capture_output=True, check=False
+    )
     if mounted.returncode:
         pytest.skip("no right to mount a file system")
     try:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from mpad_core.interfaces.errors import InputError
 from mpad_core.records.hdf5 import TrajectoryWriter
 from mpad_core.records.log import read_log
@@ -126,7 +127,7 @@ def test_a_copy_is_cut_to_the_rows_asked_for(cut_off):
 
 def test_more_rows_than_there_are_cannot_be_asked_for(cut_off):
     before = cut_off.read_bytes()
-    with pytest.raises(InputError, match="holds .* frames, the checkpoint counts 1000"):
+    with pytest.raises(InputError, match=r"holds .* frames, the checkpoint counts 1000"):
         TrajectoryWriter.resume(cut_off, {"frames": 1000, "bond_events": 0})
     assert cut_off.read_bytes() == before
     assert not cut_off.with_name("trajectory.h5.tmp").exists()

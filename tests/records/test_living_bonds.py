@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.records.hdf5 import TrajectoryWriter
 from mpad_core.records.reader import living_bonds, read_trajectory

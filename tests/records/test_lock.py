@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+
 from mpad_core.interfaces.errors import BusyError, InputError
 from mpad_core.records.lock import locked
 
@@ -25,7 +26,10 @@ def holder(tmp_path):
 
 
 def test_a_second_writer_is_refused_until_the_first_is_killed(holder, tmp_path):
-    with pytest.raises(BusyError, match=f"{tmp_path}: run directory in use .*{holder.pid}") as refused, locked(tmp_path):
+    with (
+        pytest.raises(BusyError, match=f"{tmp_path}: run directory in use .*{holder.pid}") as refused,
+        locked(tmp_path),
+    ):
         pass
     assert refused.value.exit_code == 75
     os.kill(holder.pid, signal.SIGKILL)

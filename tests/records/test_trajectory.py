@@ -3,6 +3,7 @@ import warnings
 import h5py
 import numpy as np
 import pytest
+
 from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.interfaces.observer import FieldDeclaration
 from mpad_core.records.hdf5 import TrajectoryWriter
@@ -84,7 +85,9 @@ def test_quantities_not_asked_for_take_no_room(write, tmp_path):
 
 def test_each_dataset_with_a_unit_says_it(finished):
     with h5py.File(finished) as file:
-        bare = [name for name, item in file["mpad"].items() if isinstance(item, h5py.Dataset) and "unit" not in item.attrs]
+        bare = [
+            name for name, item in file["mpad"].items() if isinstance(item, h5py.Dataset) and "unit" not in item.attrs
+        ]
         assert set(bare) == {"step", "scene", "quantities"}
         assert file["mpad/positions"].attrs["unit"] == "um"
         assert file["mpad/observers/tilt"].attrs["unit"] == "1"
@@ -95,7 +98,9 @@ def test_each_dataset_with_a_unit_says_it(finished):
 def test_no_dataset_has_a_type_of_variable_length(finished):
     with h5py.File(finished) as file:
         loose = []
-        file.visititems(lambda name, item: loose.append(name) if getattr(item, "dtype", np.dtype("f8")).hasobject else None)
+        file.visititems(
+            lambda name, item: loose.append(name) if getattr(item, "dtype", np.dtype("f8")).hasobject else None
+        )
     assert not loose
 
 
@@ -166,7 +171,8 @@ def test_two_fields_of_one_name_are_refused(toy, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"cells": ()}, {"cells": ("a", "a")}, {"kinds": ()}, {"radii": (1.0, 2.0)}, {"seed": -1}, {"quantities": ("x",)}]
+    "wrong",
+    [{"cells": ()}, {"cells": ("a", "a")}, {"kinds": ()}, {"radii": (1.0, 2.0)}, {"seed": -1}, {"quantities": ("x",)}],
 )
 def test_headers_that_make_no_sense_are_refused(wrong):
     with pytest.raises(InputError):

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+
 from mpad_core.interfaces.observer import FieldDeclaration, Frame
 from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.records.checkpoint import read_checkpoint, write_checkpoint

@@ -35,7 +35,7 @@ class Bell:
 
     def __attrs_post_init__(self) -> None:
         if self.reactive_compliance > self.rest_length:
-            raise ValueError("'reactive_compliance' must be shorter than the bond")
+            raise ValueError("reactive_compliance must be shorter than the bond")
 
 
 @frozen(kw_only=True)

@@ -115,7 +115,7 @@ FAULTS = [
     ("accuracy = { rate = 0 }", "s.toml:1: accuracy.rate: must be above 0 and at most 1, not 0"),
     ("accuracy = { position = 0.1 }", 's.toml:1: accuracy.position: must be a quantity with units, such as "2 um"'),
     ("accuracy = { position = '0.1 s' }", "s.toml:1: accuracy.position: '0.1 s' has the wrong dimension"),
-    ("accuracy = { position = '1e999 um' }", "s.toml:1: accuracy.position: '1e999 um' is not a finite number"),
+    ("accuracy = { position = '1e999 um' }", "s.toml:1: accuracy.position: must be a finite number, not '1e999 um'"),
     ("accuracy = 'high'", "s.toml:1: accuracy: must be a table, not 'high'"),
     ("effects = { thermal = true }", "s.toml:1: effects.thermal: must be one of 'auto', 'on', 'off', not true"),
     (
@@ -131,17 +131,17 @@ FAULTS = [
     ("record = { what = ['overlap', 'bond'] }", "s.toml:1: record.what[1]: must be one of 'overlap', 'velocity'"),
     ("flow = { rate = '80 1/s' }", 's.toml:1: flow.rate: a flow of kind "none" has no rate; write kind'),
     ("flow = { kind = 'shear' }", 's.toml:1: flow.rate: missing (shear rate); write rate = "80 1/s"'),
-    ("cells = { 'a b' = {} }\n[cellsx]", 's.toml:1: cells."a b": a name has only letters, digits, - and _'),
+    ("[cells.'a b']", 's.toml:9: cells."a b": a name has only letters, digits, - and _'),
     ("passage = { cell = 'b', past = 'a' }", "s.toml:1: passage.cell: no cell 'b' in this scene (there are: a)"),
     ("passage = { cell = 'a', past = 'a' }", "s.toml:1: passage.past[0]: cell 'a' cannot pass itself"),
     ("passage = { cell = 'a', past = [] }", "s.toml:1: passage.past: names no cell"),
-    ("[wall]\nroughness = '-1 nm'", "s.toml:2: wall.roughness: must be at least 0 and at most 100 um, not -0.001 um"),
+    ("[wall]\nroughness = '-1 nm'", "s.toml:10: wall.roughness: must be at least 0 and at most 100 um, not -0.001 um"),
 ]
 
 
 @pytest.mark.parametrize(("said", "line"), FAULTS)
 def test_each_fault_has_its_line(said: str, line: str, small: str) -> None:
-    lines = refused(f"{said}\n" + (small if "[" not in said.split("=")[0] else small.replace("[", "\n[", 1)))
+    lines = refused(f"{small}{said}\n" if said.startswith("[") else f"{said}\n{small}")
     assert any(found.startswith(line) for found in lines), lines
 
 
@@ -253,7 +253,7 @@ OVERRIDES = [
 @pytest.mark.parametrize(("override", "line"), OVERRIDES)
 def test_overrides_are_named_in_errors(override: str, line: str, small: str) -> None:
     lines = refused(small, override)
-    assert lines[0].startswith(line)
+    assert any(found.startswith(line) for found in lines), lines
 
 
 QUIET = """

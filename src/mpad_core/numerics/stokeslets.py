@@ -304,6 +304,24 @@ def _overlap_onto_tile(at: Array, source: Array, load: Array, out: Array) -> Non
                     out[i * TILE + t] += block[i, k] * load[k]
 
 
+@compiled
+def _tile(tile: int, sources: Array, wall: bool, loads: Array, scale: float, velocity: Array) -> None:
+    """Write the velocities of one tile of targets."""
+    count = len(sources)
+    at, out = np.empty(4 * TILE), np.zeros(6 * TILE)
+    for t in range(TILE):
+        for k in range(4):
+            at[k * TILE + t] = sources[min(tile * TILE + t, count - 1), k]
+    for j in range(count):
+        if _free_onto_tile(at, sources[j], loads[j], out):
+            _overlap_onto_tile(at, sources[j], loads[j], out)
+        if wall:
+            _image_onto_tile(at, sources[j], loads[j], out)
+    for t in range(min(TILE, count - tile * TILE)):
+        for k in range(6):
+            velocity[tile * TILE + t, k] = out[k * TILE + t] * scale
+
+
 @compiled_parallel
 def mobility_product(centres: Array, radii: Array, viscosity: float, wall: bool, loads: Array) -> Array:
     """Give the grand mobility times loads (N, 6), without forming the matrix: velocities (N, 6).
@@ -316,17 +334,11 @@ def mobility_product(centres: Array, radii: Array, viscosity: float, wall: bool,
     sources[:, :3] = centres
     sources[:, 3] = radii
     velocity = np.empty((count, 6))
-    for tile in numba.prange((count + TILE - 1) // TILE):
-        at, out = np.empty(4 * TILE), np.zeros(6 * TILE)
-        for t in range(TILE):
-            for k in range(4):
-                at[k * TILE + t] = sources[min(tile * TILE + t, count - 1), k]
-        for j in range(count):
-            if _free_onto_tile(at, sources[j], loads[j], out):
-                _overlap_onto_tile(at, sources[j], loads[j], out)
-            if wall:
-                _image_onto_tile(at, sources[j], loads[j], out)
-        for t in range(min(TILE, count - tile * TILE)):
-            for k in range(6):
-                velocity[tile * TILE + t, k] = out[k * TILE + t] / (8 * math.pi * viscosity)
+    scale = 1 / (8 * math.pi * viscosity)
+    tiles = (count + TILE - 1) // TILE
+    if tiles == 1:  # waking the threads costs more
+        _tile(0, sources, wall, loads, scale, velocity)
+        return velocity
+    for tile in numba.prange(tiles):
+        _tile(tile, sources, wall, loads, scale, velocity)
     return velocity

@@ -1,5 +1,6 @@
 """What a trajectory file says it holds, checked against the layout: the way both to the reader and to salvage."""
 
+import os
 from typing import Any
 
 import h5py
@@ -53,7 +54,7 @@ def contents(file: Any) -> Contents:
     finished = not file.swmr_mode
     rows = {FRAMES: min(map(len, found)), BOND_EVENTS: 0 if events is None else len(events)}
     if not finished:
-        rows = _whole(file, events, rows)
+        rows = _whole(file, events, _within_file(found, events, rows))
     return Contents(
         header=header, fields=fields, columns=made, datasets=found, events=events, rows=rows, finished=finished
     )
@@ -103,6 +104,22 @@ def _fields(file: Any) -> tuple[FieldDeclaration, ...]:
 def _plain(dtype: Any) -> str:
     """Name a type as a declaration would: f8 rather than <f8, bool as itself."""
     return "bool" if dtype == np.bool_ else str(np.dtype(dtype).str.lstrip("<|="))
+
+
+def _within_file(datasets: tuple[Any, ...], events: Any | None, rows: dict[str, int]) -> dict[str, int]:
+    """Leave out rows that lie beyond the file's end, as a machine's death leaves them: HDF5 reads zeros there."""
+    frames = min(map(_first_beyond, datasets))
+    happened = 0 if events is None else _first_beyond(events)
+    return {FRAMES: min(rows[FRAMES], frames), BOND_EVENTS: min(rows[BOND_EVENTS], happened)}
+
+
+def _first_beyond(dataset: Any) -> int:
+    if dataset.chunks is None:
+        raise InputError(f"{dataset.name}: is not stored in pieces, as a dataset that grows must be")
+    ends: list[tuple[int, int]] = []
+    dataset.id.chunk_iter(lambda chunk: ends.append((chunk.chunk_offset[0], chunk.byte_offset + chunk.size)))
+    size = os.stat(dataset.file.filename).st_size
+    return min((row for row, end in ends if end > size), default=len(dataset))
 
 
 def _whole(file: Any, events: Any | None, rows: dict[str, int]) -> dict[str, int]:

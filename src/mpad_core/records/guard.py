@@ -19,6 +19,8 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 _DEFLATE_RATIO = 1032  # the most that deflate can shrink
 _SLACK = 2**20  # bytes that a dataset may claim beyond what is stored: rows that a killed writer had announced
 _MOST_OBJECTS = 10_000
+_FLAGS = 11  # where a superblock of version 3 keeps them; HDF5 checks its sum
+_SWMR_WRITING = 4  # a SWMR writer is at work, or was killed
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError, AttributeError)
 
 
@@ -73,8 +75,16 @@ def _open(path: Path) -> Any:
         raise InputError("not an HDF5 file, or its beginning is lost")
     try:
         return h5py.File(path, "r")
-    except OSError:  # a writer is at work or was killed: only a SWMR reader is let in then
-        return h5py.File(path, "r", swmr=True)
+    except OSError:
+        if not _being_written(path):
+            raise
+    return h5py.File(path, "r", swmr=True)  # which would let in every file, and read zeros where one was cut short
+
+
+def _being_written(path: Path) -> bool:
+    with path.open("rb") as stream:
+        head = stream.read(_FLAGS + 1)
+    return bool(head[_FLAGS] & _SWMR_WRITING)
 
 
 def _inspect(file: Any) -> None:

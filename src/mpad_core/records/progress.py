@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol, TextIO
 
-from attrs import Factory, define, field
+from attrs import define, field
 
 from mpad_core.records.log import RunLog, json_line
 
@@ -85,7 +85,7 @@ class _Speed:
 
     total: float
     start: float
-    began: float = Factory(time.monotonic)
+    began: float = field(factory=lambda: time.monotonic())
 
     def so_far(self, simulated: float) -> tuple[float, float]:
         """Give simulated seconds a second, and seconds of wall time left; infinite before anything has moved."""
@@ -102,7 +102,7 @@ class _Lines:
     interval: float
     log: RunLog | None
     sinks: list[Callable[[str], object]]
-    last: float = field(factory=time.monotonic)
+    last: float = field(factory=lambda: time.monotonic())
 
     def update(self, simulated: float, step: int) -> None:
         now = time.monotonic()

@@ -61,7 +61,7 @@ def dotted(path: Path) -> str:
 
 def _key(key: str) -> str:
     short = key if len(key) <= LONGEST_KEY else key[: LONGEST_KEY - 3] + "..."
-    return short if BARE.fullmatch(short) else json.dumps(short, ensure_ascii=False)
+    return short if BARE.fullmatch(key) else json.dumps(short, ensure_ascii=False)
 
 
 def one_line(*pieces: str) -> str:

@@ -155,7 +155,8 @@ def _unquoted(token: Token) -> str:
 
 
 def _reader(text: str) -> _Reader:
-    return _Reader([token for token in tokens(text) if token.kind not in ("comment", "space")])
+    kept = [token for token in tokens(text) if token.kind not in ("comment", "space")]
+    return _Reader([*kept, Token("end", "", 0)])
 
 
 def key_lines(text: str) -> dict[Path, int]:

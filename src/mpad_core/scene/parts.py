@@ -130,7 +130,7 @@ def try_build(part: Part, **filled: Any) -> None:
     Raises
     ------
     WrongError
-        With what a validator says, at the parameter it names.
+        With what a validator says, at its parameter.
     PartError
         If the part fails in any other way.
     """
@@ -138,7 +138,18 @@ def try_build(part: Part, **filled: Any) -> None:
         part.build(**filled)
     except (ValueError, TypeError) as error:
         message = str(error.args[0]) if error.args else type(error).__name__
-        culprit = [key for key in part.parameters if message.startswith(f"'{key}'")]
-        raise WrongError(Fault(tuple(culprit[:1]), f"{part.name!r} refuses: {message}")) from error
+        raise WrongError(Fault(_culprit(part, message), f"{part.name!r} refuses: {message}")) from error
     except Exception as error:  # a stranger's class may raise anything
         raise PartError(f"{part.kind} {part.name!r} cannot be made: {type(error).__name__}: {error}") from error
+
+
+def _culprit(part: Part, message: str) -> tuple[str, ...]:
+    """Find the parameter whose validator says this; empty if none does on its own."""
+    for field in attrs.fields(registry.load(part.kind, part.name)):
+        if field.validator is not None and field.alias in part.parameters:
+            try:
+                field.validator(None, field, part.parameters[field.alias])
+            except Exception as error:  # also where a validator needs the instance
+                if error.args and str(error.args[0]) == message:
+                    return (field.alias,)
+    return ()

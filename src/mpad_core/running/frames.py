@@ -1,0 +1,51 @@
+"""Frames: what is recorded of the way between two states."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from mpad_core.arrays import Array
+from mpad_core.interfaces.observer import Frame
+from mpad_core.physics.measures import Hazards
+from mpad_core.physics.problem import Problem
+from mpad_core.physics.state import State
+from mpad_core.running.schedules import Schedule
+
+
+def frame_of(problem: Problem, hazards: Hazards, before: State, after: State, share: float) -> Frame:
+    """Give the frame at a share of the way from one state to the next; positions are interpolated linearly."""
+
+    def between(a: Array, b: Array) -> Array:
+        return b if share == 1.0 else a + share * (b - a)
+
+    time = float(between(np.array(before.time), np.array(after.time)))
+    turn = between(before.orientations, after.orientations)
+    centres = between(before.centres, after.centres)
+    gaps = between(before.wall_gaps, after.wall_gaps)
+    return Frame(
+        step=before.step + round(share * (after.step - before.step)) - after.zero,
+        time=time,
+        cells=problem.names,
+        centres=centres,
+        orientations=turn / np.linalg.norm(turn, axis=1, keepdims=True),
+        velocities=after.drift,
+        wall_gaps=gaps if problem.setting.wall else np.full(len(gaps), np.inf),
+        overlaps=centres[:, 2] - problem.zero_overlap,
+        bond_counts=_bond_counts(before, after, time).astype(float),
+        capture_hazards=hazards.at(centres),
+    )
+
+
+def _bond_counts(before: State, after: State, time: float) -> Any:
+    """Count each cell's bonds at a time: those before, and the events since."""
+    counts = before.bond_counts()
+    past = after.events[after.events["time"] <= time]
+    np.add.at(counts, past["cell"], np.where(past["kind"] == 0, 1, -1))
+    return counts
+
+
+def frames(problem: Problem, hazards: Hazards, schedule: Schedule, before: State, after: State) -> Iterator[Frame]:
+    """Yield the frames that are due between two states."""
+    for share in schedule.due(before, after):
+        yield frame_of(problem, hazards, before, after, share)

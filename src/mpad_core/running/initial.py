@@ -1,0 +1,104 @@
+"""The state at time zero, with every cell that first rolls alone brought to where its bonds have a steady state."""
+
+from collections.abc import Callable
+
+import numpy as np
+from attrs import evolve
+
+from mpad_core.arrays import Array
+from mpad_core.interfaces.values import Configuration
+from mpad_core.physics.coupling import coupler, lone_cell
+from mpad_core.physics.problem import Problem
+from mpad_core.physics.state import BondList, State, no_bonds
+from mpad_core.running.march import make_ready, march
+
+Listener = Callable[[str, State], None]
+
+
+def at_rest(problem: Problem) -> State:
+    """Give the cells at their places, without bonds, moving as flow and weight alone would have them."""
+    cells = len(problem.names)
+    state = State(
+        step=0,
+        zero=0,
+        time=0.0,
+        centres=problem.start.copy(),
+        wall_gaps=problem.start[:, 2] - problem.radii,
+        orientations=np.tile([1.0, 0.0, 0.0, 0.0], (cells, 1)),
+        velocities=np.zeros((cells, 6)),
+        drift=np.zeros((cells, 6)),
+        mean_loads=problem.external.copy(),
+        bonds=no_bonds(),
+        bound_since=np.full(cells, np.inf),
+        bound_at=problem.start[:, 0].copy(),
+        caught_since=np.full(cells, np.inf),
+    )
+    return evolve(state, drift=_first_velocities(problem, state))
+
+
+def _first_velocities(problem: Problem, state: State) -> Array:
+    """Give the velocities (N, 6) under weight and flow: where the first outer step predicts its middle from."""
+    configuration = Configuration(centres=state.centres, radii=problem.radii, wall_gaps=state.wall_gaps)
+    coupling = coupler(problem).at(configuration, state.mean_loads, None)
+    velocity = np.zeros((len(problem.names), 6))
+    for group, matrix in zip(coupling.groups, coupling.matrices, strict=True):
+        resistance = matrix.copy()
+        right = np.zeros(6 * len(group))
+        for place, cell in enumerate(group):
+            o = 6 * place
+            lone, ambient = lone_cell(
+                problem.setting, float(problem.radii[cell]), float(state.centres[cell, 2]), float(state.wall_gaps[cell])
+            )
+            resistance[o : o + 6, o : o + 6] += lone
+            right[o : o + 6] = problem.external[cell] + ambient + coupling.loads[cell]
+        velocity[group] = np.linalg.solve(resistance, right).reshape(-1, 6)
+    return velocity
+
+
+def initial_state(problem: Problem, listener: Listener = lambda name, state: None) -> State:
+    """Give the state at time zero.
+
+    Cells that first roll alone do so one after the other, each without all others; then each is moved back along the
+    wall, its bonds with it, to the place that the scene gives. `listener` hears every state of these preparations.
+    """
+    state = at_rest(problem)
+    last = 0
+    for cell in np.flatnonzero(problem.alone_for > 0):
+        alone = problem.only([cell])
+        rolled = at_rest(alone)
+        for rolled_on in march(make_ready(alone), rolled, float(problem.alone_for[cell])):
+            rolled = rolled_on
+            listener(problem.names[cell], rolled)
+        state = _placed(problem, state, rolled, int(cell))
+        last = max(last, rolled.step)
+    return evolve(state, step=last, zero=last)
+
+
+def _placed(problem: Problem, state: State, rolled: State, cell: int) -> State:
+    """Put one prepared cell into the state of all."""
+    shift = problem.start[cell] - rolled.centres[0]
+    shift[2] = 0.0
+    first_site = sum(
+        round(float(density) * 4 * np.pi * problem.radii[i] ** 2)
+        for i in range(cell)
+        for density in problem.site_densities[i]
+    )
+    own = rolled.bonds
+    bonds = BondList(
+        cell=np.concatenate([state.bonds.cell, np.full(len(own), cell)]),
+        site=np.concatenate([state.bonds.site, own.site + first_site]),
+        species=np.concatenate([state.bonds.species, own.species]),
+        ligand=np.concatenate([state.bonds.ligand, own.ligand]),
+        anchor=np.concatenate([state.bonds.anchor, own.anchor + shift]),
+    )
+    changed = {"centres": rolled.centres[0] + shift}
+    names = ("wall_gaps", "orientations", "velocities", "drift", "mean_loads")
+    changed |= {name: getattr(rolled, name)[0] for name in names}
+    changed["caught_since"] = 0.0 if np.isfinite(rolled.caught_since[0]) else np.inf
+    changed["bound_since"] = 0.0 if len(own) else np.inf
+    changed["bound_at"] = problem.start[cell, 0]
+    arrays = {}
+    for name, value in changed.items():
+        arrays[name] = getattr(state, name).copy()
+        arrays[name][cell] = value
+    return evolve(state, bonds=bonds, **arrays)

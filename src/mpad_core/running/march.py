@@ -1,0 +1,170 @@
+"""The march: outer steps one after the other, each a solve for the coupling and a burst under it.
+
+The coupling is taken at the configuration predicted for the middle of the burst, which makes the outer step second
+order. Everything that decides about a step is in the state, so a march that goes on from a stored state takes the very
+same steps.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from attrs import evolve, frozen
+
+from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.values import BOND_EVENT, Configuration
+from mpad_core.physics.coupling import Coupler, Coupling, coupler, lone_cell
+from mpad_core.physics.problem import Problem
+from mpad_core.physics.state import State
+from mpad_core.running import assembly, pace
+from mpad_core.running.burst import NO_BALANCE, NOT_POSITIVE, ROOM_NEEDED, burst
+from mpad_core.running.layout import Dice, Limits, Motion
+
+_EVENTS = 4096  # room to begin with; it grows
+
+
+@frozen(kw_only=True, eq=False)
+class Machine:
+    """A problem made ready to march."""
+
+    problem: Problem
+    fixed: assembly.Fixed
+    pace: pace.Pace
+    coupler: Coupler
+
+
+def make_ready(problem: Problem) -> Machine:
+    """Tabulate laws, place molecules, choose steps and let the solver make its plan."""
+    fixed = assembly.assemble(problem)
+    return Machine(problem=problem, fixed=fixed, pace=pace.choose_pace(problem, fixed), coupler=coupler(problem))
+
+
+def configuration_of(problem: Problem, state: State) -> Configuration:
+    """Give where the cells are."""
+    return Configuration(centres=state.centres, radii=problem.radii, wall_gaps=state.wall_gaps)
+
+
+def _ahead(problem: Problem, state: State, time: float) -> Configuration:
+    """Predict the configuration a time ahead; no gap to the wall closes by more than a tenth."""
+    shift = state.drift[:, :3] * time
+    if problem.setting.wall:
+        shift[:, 2] = np.maximum(shift[:, 2], -0.1 * state.wall_gaps)
+    return Configuration(centres=state.centres + shift, radii=problem.radii, wall_gaps=state.wall_gaps + shift[:, 2])
+
+
+def march(machine: Machine, state: State, until: float) -> Iterator[State]:
+    """Yield the state after each outer step, the one given first, up to a time (s).
+
+    Raises
+    ------
+    RefusedError
+        If the solver or the balance of loads refuses, naming the cells.
+    """
+    yield state
+    while state.time < until - 0.5 * machine.pace.sub_step:
+        state = step(machine, state, until)
+        yield state
+
+
+def step(machine: Machine, state: State, until: float) -> State:
+    """Take one outer step."""
+    problem = machine.problem
+    pairs = _coupled_pairs(machine, state)
+    length = pace.expected_length(problem, pairs, machine.pace, state.centres, state.drift)
+    middle = _ahead(problem, state, 0.5 * min(length, until - state.time))
+    coupling = machine.coupler.at(middle, state.mean_loads, state.guess)
+    bounds = pace.limits(problem, pairs, machine.pace, state.centres, middle.wall_gaps, until - state.time)
+    return _burst(machine, state, coupling, bounds)
+
+
+def _coupled_pairs(machine: Machine, state: State) -> Any:
+    """List the pairs whose relative motion bounds a burst: all that are coupled, or could touch."""
+    reach = np.inf if machine.problem.coupled else _contact_range(machine)
+    return assembly.near_pairs(machine.problem, state.centres, reach)
+
+
+def _contact_range(machine: Machine) -> float:
+    """Give the smooth gap (µm) within which two cells may touch, with room for what they move in a burst."""
+    rough = 2 * float(machine.problem.roughness.max())
+    return 1.25 * max(rough + machine.fixed.contact_reach, 0.0)
+
+
+def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits) -> State:
+    """Run the burst, with as much room for bonds and events as it needs; make the next state of its outcome."""
+    problem, fixed = machine.problem, machine.fixed
+    data = assembly.system(problem, fixed, state, coupling, _contact_range(machine))
+    motion = assembly.motion_of(state)
+    bound = np.zeros(len(fixed.molecules.kind), np.uint8)
+    bound[state.bonds.site] = 1
+    bonds = assembly.bond_room(state.bonds, 2 * len(state.bonds) + _EVENTS)
+    events: list[Any] = []
+    total = 0
+    while True:
+        buffer: Any = np.zeros(len(bonds.cell) + _EVENTS, BOND_EVENT)
+        filled = np.zeros(1, np.int64)
+        left = bounds._replace(most=bounds.most - total)
+        outcome, done, group = burst(
+            data, bonds, bound, motion, left, Dice(fixed.key, state.step + total), buffer, filled
+        )
+        total += done
+        events.append(buffer[: filled[0]])
+        if outcome != ROOM_NEEDED:
+            break
+        bonds = assembly.bond_room(assembly.bond_list(bonds), 2 * len(bonds.cell) + _EVENTS)
+    if outcome == NO_BALANCE or (outcome == NOT_POSITIVE and total == 0):
+        _refuse(machine, state, coupling, outcome, group)
+    return _next(machine, state, motion, assembly.bond_list(bonds), np.concatenate(events), total, coupling)
+
+
+def _refuse(machine: Machine, state: State, coupling: Coupling, outcome: int, group: int) -> None:
+    problem = machine.problem
+    cells = coupling.groups[group]
+    where = ", ".join(f"{problem.names[i]} (gap to the wall {state.wall_gaps[i]:.4g} um)" for i in cells)
+    what = "no sub-step balances the loads" if outcome == NO_BALANCE else "resistance is not positive definite"
+    raise RefusedError(f"step {state.step}, t = {state.time:.6g} s: {what} for {where}; solver {problem.solver.name!r}")
+
+
+def _next(
+    machine: Machine, state: State, motion: Motion, bonds: Any, events: Any, steps: int, coupling: Coupling
+) -> State:
+    done = state.step + steps
+    now = (done - state.zero) * machine.pace.sub_step
+    lasted = steps * machine.pace.sub_step
+    events["time"] = (events["step"] - state.zero) * machine.pace.sub_step
+    moved = motion.centre - state.centres
+    following = evolve(
+        state,
+        step=done,
+        time=now,
+        centres=motion.centre,
+        wall_gaps=motion.gap,
+        orientations=motion.orientation,
+        velocities=motion.velocity,
+        drift=np.concatenate([moved / lasted, motion.velocity[:, 3:]], axis=1),
+        mean_loads=motion.impulse / lasted,
+        bonds=bonds,
+        guess=coupling.guess,
+        events=events,
+    )
+    return _with_captures(machine.problem, following)
+
+
+def _with_captures(problem: Problem, state: State) -> State:
+    """Keep account of who is caught: bound without a break for a while, and slow over that while."""
+    bound = state.bond_counts() > 0
+    since = np.where(bound, np.minimum(state.bound_since, state.time), np.inf)
+    at = np.where(np.isinf(state.bound_since) | ~bound, state.centres[:, 0], state.bound_at)
+    caught = np.where(bound, state.caught_since, np.inf)
+    for i in np.flatnonzero(bound & (state.time - since >= problem.caught.bound_for)):
+        speed = abs(state.centres[i, 0] - at[i]) / max(state.time - since[i], 1e-300)
+        if speed < problem.caught.slower_than * free_stream_speed(problem, state, int(i)):
+            caught[i] = min(caught[i], state.time)
+        since[i], at[i] = state.time, state.centres[i, 0]  # a new while begins
+    return evolve(state, bound_since=since, bound_at=at, caught_since=caught)
+
+
+def free_stream_speed(problem: Problem, state: State, cell: int) -> float:
+    """Give the speed (µm/s) at which the flow alone would carry a lone cell at its height."""
+    radius = float(problem.radii[cell])
+    resistance, load = lone_cell(problem.setting, radius, float(state.centres[cell, 2]), float(state.wall_gaps[cell]))
+    return float(np.linalg.solve(resistance, load)[0])

@@ -1,0 +1,73 @@
+"""How long steps may be: the sub-step of the burst, and how far a frozen coupling is used."""
+
+import numpy as np
+from attrs import frozen
+
+from mpad_core.arrays import Array, Indices
+from mpad_core.physics.problem import Problem
+from mpad_core.running.assembly import Fixed
+from mpad_core.running.layout import Limits
+
+_MOST_SUB_STEPS = 1000  # in one burst, so that a run can be told to stop
+_GAP_CHANGE = 0.2  # of a cell's gap to the wall over which the frozen coupling may be combined with r(h)
+_LARGEST_SUB_STEP = 1e-3  # s, where nothing else bounds it
+_VERTICAL = 0.01  # vertical velocities are this fraction of the flow's past a cell, or less
+
+
+@frozen(kw_only=True)
+class Pace:
+    """The step lengths of a run."""
+
+    sub_step: float  # s
+    longest: float  # s, of a burst
+    share: float  # η: of the gap between two cells that they may move relative to each other in a burst
+
+
+def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
+    """Choose the steps from the accuracies asked for.
+
+    A test of P = 1 − exp(−k Δt) a sub-step delays events by Δt/2, a relative error k Δt/2 of their rate: the largest
+    on-rate bounds the sub-step. Backward Euler errs by Δt/2 times the change of the velocity; the height must stay
+    within ``position``. The coupling is taken in the middle of a burst, so its error grows with η².
+    """
+    tolerances = problem.tolerances
+    bounds = [_LARGEST_SUB_STEP]
+    rates = fixed.species.tables.coefficients[:, 2, 0]
+    if rates.size and rates.max() > 0:
+        bounds.append(2 * tolerances.rate / float(rates.max()))
+    settling = np.abs(problem.external[:, :3]).max() / (6 * np.pi * problem.setting.viscosity * problem.radii.min())
+    vertical = _VERTICAL * abs(problem.setting.shear_rate) * float(problem.radii.max()) + float(settling)
+    if vertical > 0:
+        bounds.append(2 * tolerances.position / vertical)
+    sub_step = float(f"{min(bounds):.1e}")
+    shear = abs(problem.setting.shear_rate)
+    longest = max(0.1 / shear if shear > 0 else 0.01, sub_step)
+    share = float(np.clip(0.02 * np.sqrt(tolerances.position / 1e-4), 0.002, 0.1))
+    return Pace(sub_step=sub_step, longest=longest, share=share)
+
+
+def moves(problem: Problem, pairs: Indices, centres: Array, share: float) -> Array:
+    """Give how far each pair (P,) may move relative to each other: a share of its gap (µm)."""
+    i, j = pairs[:, 0], pairs[:, 1]
+    gaps = np.linalg.norm(centres[i] - centres[j], axis=1) - problem.radii[i] - problem.radii[j]
+    allowed: Array = share * np.maximum(gaps, 1e-3 * np.minimum(problem.radii[i], problem.radii[j]))
+    return allowed
+
+
+def expected_length(problem: Problem, pairs: Indices, pace: Pace, centres: Array, drift: Array) -> float:
+    """Give how long (s) the next burst will last if the cells go on as before."""
+    if len(pairs) == 0:
+        return pace.longest
+    speeds = np.linalg.norm(drift[pairs[:, 0], :3] - drift[pairs[:, 1], :3], axis=1)
+    times = moves(problem, pairs, centres, pace.share) / np.maximum(speeds, 1e-300)
+    return float(min(pace.longest, times.min()))
+
+
+def limits(problem: Problem, pairs: Indices, pace: Pace, centres: Array, middle_gaps: Array, left: float) -> Limits:
+    """Give the limits of a burst whose coupling was taken at `middle_gaps`; `left` (s) is the time to the run's end."""
+    wanted = min(pace.longest, left)
+    most = int(np.clip(np.ceil(wanted / pace.sub_step * (1 - 1e-9)), 1, _MOST_SUB_STEPS))
+    free = problem.setting.wall & problem.coupled
+    low = middle_gaps * (1 - _GAP_CHANGE) if free else np.full(len(middle_gaps), -np.inf)
+    high = middle_gaps * (1 + _GAP_CHANGE) if free else np.full(len(middle_gaps), np.inf)
+    return Limits(pace.sub_step, most, pairs, moves(problem, pairs, centres, pace.share), low, high)

@@ -1,0 +1,159 @@
+"""From a scene to a problem: names resolved, effects decided, cells placed. After this no name is looked up again."""
+
+import zlib
+
+import numpy as np
+from attrs import evolve
+
+from mpad_core.arrays import Array
+from mpad_core.interfaces.errors import InputError
+from mpad_core.interfaces.values import Configuration, Setting
+from mpad_core.physics.problem import BondSpecies, CaughtWhen, Effect, Problem, Tolerances
+from mpad_core.physics.questions import check_needs
+from mpad_core.scene.effects import decide
+from mpad_core.scene.spec import Cell, Group, Scene
+from mpad_core.units import thermal_energy
+
+_TRIES = 1000  # for each cell placed at random
+
+
+def compose(scene: Scene, replicate: int = 0) -> Problem:
+    """Make the problem that a scene describes.
+
+    Parameters
+    ----------
+    scene
+        A checked scene.
+    replicate
+        Which of several runs that differ only in their random numbers: it is added to the scene's seed.
+
+    Raises
+    ------
+    InputError
+        For effects that cannot be had, a solver that cannot treat the scene, cells that do not fit.
+    PartError
+        If a part fails to load.
+    """
+    scene = evolve(scene, seed=scene.seed + replicate)
+    solver = scene.solver.instance
+    effects = decide(scene, solver.traits)
+    cells, start = _placed(scene)
+    kinds = [scene.kinds[cell.kind] for cell in cells.values()]
+    radii = np.array([kind.radius for kind in kinds])
+    setting = Setting(
+        viscosity=scene.fluid.viscosity, shear_rate=scene.flow.rate if effects["shear"].on else 0.0,
+        wall=effects["wall"].on,
+    )  # fmt: skip
+    if effects["coupling"].on:
+        check_needs(solver.traits, solver.name, Configuration(centres=start, radii=radii), setting)
+    species = _species(scene) if scene.bonds and scene.effects.bonds != "off" else ()
+    sites = _site_densities(scene, cells)
+    binds = np.array([cell.binds and effects["bonds"].on for cell in cells.values()])
+    names = list(cells)
+    partners = [scene.partner_of(name) if name in scene.cells else None for name in names]
+    partner = np.array([-1 if other is None else names.index(other) for other in partners], np.int64)
+    return Problem(
+        names=tuple(names),
+        kinds=tuple(cell.kind for cell in cells.values()),
+        radii=radii,
+        roughness=np.array([kind.roughness for kind in kinds]),
+        held=np.array([cell.held for cell in cells.values()]),
+        site_densities=sites * binds[:, None],
+        hazard_densities=sites,
+        start=start,
+        alone_for=np.array([cell.start.rolling_alone if isinstance(cell, Cell) else 0.0 for cell in cells.values()]),
+        zero_overlap=np.array([scene.zero_overlap_height(cell.kind) for cell in cells.values()]),
+        partner=partner,
+        dx_from=start[np.where(partner < 0, np.arange(len(names)), partner), 0],
+        external=_weights(scene, effects["gravity"], cells),
+        setting=setting,
+        solver=solver,
+        coupled=effects["coupling"].on,
+        wall_roughness=scene.wall.roughness if scene.wall else 0.0,
+        species=species,
+        contact=scene.repulsion.instance if scene.repulsion and effects["repulsion"].on else None,
+        tolerances=Tolerances(position=scene.accuracy.position, rate=scene.accuracy.rate),
+        caught=CaughtWhen(bound_for=scene.record.caught.bound_for, slower_than=scene.record.caught.slower_than),
+        seed=scene.seed,
+        effects=tuple(effects.values()),
+        site_kinds=_site_names(scene),
+    )
+
+
+def _site_names(scene: Scene) -> tuple[str, ...]:
+    """Name the sites of cells that take part in bonds, each once."""
+    return tuple(dict.fromkeys(bond.between[0] for bond in scene.bonds.values()))
+
+
+def _site_densities(scene: Scene, cells: dict[str, Cell | Group]) -> Array:
+    names = _site_names(scene)
+    densities = np.zeros((len(cells), len(names)))
+    for i, cell in enumerate(cells.values()):
+        for j, name in enumerate(names):
+            site = scene.kinds[cell.kind].sites.get(name)
+            densities[i, j] = site.density if site else 0.0
+    return densities
+
+
+def _species(scene: Scene) -> tuple[BondSpecies, ...]:
+    assert scene.wall is not None  # a scene with bonds and no wall has been refused
+    kT = thermal_energy(scene.fluid.temperature)
+    return tuple(
+        BondSpecies(
+            name=name,
+            site_kind=_site_names(scene).index(bond.between[0]),
+            model=bond.model.build(rest_length=bond.length, stiffness=bond.stiffness, kT=kT),
+            surface=scene.wall.sites[bond.between[1]].instance,
+            rest_length=bond.length,
+            on_rate=bond.on_rate.value,
+            at_density=bond.on_rate.at_density,
+            reach=bond.reach,
+            compression=bond.compression,
+            kT=kT,
+        )
+        for name, bond in scene.bonds.items()
+    )
+
+
+def _weights(scene: Scene, gravity: Effect, cells: dict[str, Cell | Group]) -> Array:
+    """Give each cell's weight less its buoyancy (pN) as loads (N, 6)."""
+    loads = np.zeros((len(cells), 6))
+    if gravity.on:
+        for i, cell in enumerate(cells.values()):
+            kind = scene.kinds[cell.kind]
+            excess = 4 / 3 * np.pi * kind.radius**3 * (kind.density - scene.fluid.density)
+            loads[i, :3] = excess * np.array(scene.gravity.acceleration)
+    return loads
+
+
+def _placed(scene: Scene) -> tuple[dict[str, Cell | Group], Array]:
+    """Give every cell by name, those of groups numbered, and where each starts (N, 3)."""
+    cells: dict[str, Cell | Group] = dict(scene.cells)
+    places = [[cell.x, cell.y, scene.height_of(cell)] for cell in scene.cells.values()]
+    radii = [scene.kinds[cell.kind].radius for cell in scene.cells.values()]
+    for name, group in scene.groups.items():
+        seeds = np.random.SeedSequence((scene.seed, zlib.crc32(name.encode())))
+        draws = np.random.Generator(np.random.Philox(seeds))
+        radius, height = scene.kinds[group.kind].radius, scene.height_of(group)
+        for number in range(group.number):
+            places.append(_free_place(name, group, height, radius, draws, np.array(places), np.array(radii)))
+            radii.append(radius)
+            cells[f"{name}-{number + 1}"] = group
+    return cells, np.array(places, float)
+
+
+def _free_place(
+    name: str, group: Group, height: float, radius: float, draws: np.random.Generator, places: Array, radii: Array
+) -> list[float]:
+    """Draw a place in the group's rectangle that leaves the smallest gap to every cell placed so far."""
+    for _ in range(_TRIES):
+        place = [draws.uniform(*group.x), draws.uniform(*group.y), height]
+        if not len(places):
+            return place
+        gaps = np.linalg.norm(places - place, axis=1) - radii - radius
+        if gaps.min() > group.minimum_gap:
+            return place
+    raise InputError(
+        f"groups.{name}: no room for {group.number} cells of radius {radius:g} um in its rectangle after {_TRIES} "
+        "tries for one of them; enlarge x or y, or lower number or minimum_gap"
+    )

@@ -1,0 +1,97 @@
+"""The dimensionless groups that tell which effects matter in a scene; plain numpy, estimates to a few per cent."""
+
+import math
+
+import numpy as np
+from attrs import frozen
+
+from mpad_core.physics.problem import Problem
+
+_SLIDING = 0.67  # speed of a cell near the wall over that of the fluid at its centre
+_HELD_FORCE, _HELD_TORQUE = 1.7005, 0.944  # force and torque in shear on a held sphere touching the wall (O'Neill 1968)
+
+
+@frozen(kw_only=True)
+class Group:
+    """One dimensionless number, what it compares, and its value."""
+
+    name: str
+    meaning: str
+    value: float
+
+
+def _squeeze(gap: float, radius: float) -> float:
+    """Give the drag normal to the wall over Stokes', within 1 % (Bevan & Prieve, J Chem Phys 113:1228, 2000)."""
+    return (6 * gap**2 + 9 * gap * radius + 2 * radius**2) / (6 * gap**2 + 2 * gap * radius)
+
+
+def passage_time(problem: Problem, longest: float) -> float:
+    """Give the time (s) in which the flow carries a cell past all others, at most the run's."""
+    span = float(np.ptp(problem.start[:, 0])) + 20 * float(problem.radii.max())
+    shear = abs(problem.setting.shear_rate)
+    speed = _SLIDING * shear * float(problem.radii.max())
+    return min(longest, span / speed) if speed > 0 else longest
+
+
+def dimensionless_groups(problem: Problem, fluid_density: float, kT: float, longest: float) -> list[Group]:
+    """Work the groups out for the cell that starts lowest.
+
+    Parameters
+    ----------
+    problem
+        What the scene asks for.
+    fluid_density
+        pN s²/µm⁴.
+    kT
+        pN µm.
+    longest
+        s, the run's length.
+    """
+    low = int(np.argmin(problem.start[:, 2] - problem.radii))
+    radius, gap = float(problem.radii[low]), float(problem.start[low, 2] - problem.radii[low])
+    shear, viscosity = abs(problem.setting.shear_rate), problem.setting.viscosity
+    passage = passage_time(problem, longest)
+    drag = 6 * math.pi * viscosity * radius * (_squeeze(max(gap, 1e-6 * radius), radius) if problem.setting.wall else 1)
+    weight = abs(float(problem.external[low, 2]))
+    groups = [
+        Group(
+            name="Re",
+            meaning="inertia by viscosity, rho gamma a^2 / mu",
+            value=fluid_density * shear * radius**2 / viscosity,
+        ),
+    ]
+    for species in problem.species[:1]:
+        length = species.rest_length
+        spread = math.sqrt(2 * kT * passage / drag)
+        stiffness = float(np.diff(species.model.tension(np.array([1.01, 1.02]) * length))[0] / (0.01 * length))
+        force = _HELD_FORCE * 6 * math.pi * viscosity * radius**2 * shear
+        torque = _HELD_TORQUE * 4 * math.pi * viscosity * radius**3 * shear
+        tether = math.sqrt(radius / (2 * length)) * (force + torque / radius)
+        lengths = np.array([length, length + tether / max(stiffness, 1e-300)])
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            rates = np.asarray(species.model.off_rate(lengths), float)
+            speeding = float(np.log(rates[1] / rates[0]))
+        relaxation = drag / max(stiffness, 1e-300) * shear
+        groups += [
+            Group(
+                name="settling",
+                meaning="settling in a passage, by the bond's length",
+                value=weight / drag * passage / length,
+            ),
+            Group(
+                name="spread",
+                meaning="thermal spread in height in a passage, by the bond's length",
+                value=spread / length,
+            ),
+            Group(
+                name="F r0/kT",
+                meaning="log of how much the load of a held cell on one tether speeds its breaking",
+                value=speeding,
+            ),
+            Group(
+                name="relaxation",
+                meaning="relaxation of one bond against the drag, by the shear time",
+                value=relaxation,
+            ),
+        ]
+    return groups
