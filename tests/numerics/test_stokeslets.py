@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from mpad_core.arrays import Array
 from mpad_core.numerics import stokeslets
 
@@ -36,7 +37,7 @@ def blake(x: Array, y: Array) -> Array:
     return G
 
 
-def surface(a: float, degree: int = 24) -> tuple[Array, Array]:
+def surface(a: float, degree: int) -> tuple[Array, Array]:
     """Give points on a sphere and weights that sum to one, exact to the degree."""
     c, w = np.polynomial.legendre.leggauss(degree)
     angle = 2 * np.pi * np.arange(2 * degree) / (2 * degree)
@@ -126,12 +127,7 @@ def test_faxen_by_finite_differences() -> None:
 def test_wall_part_is_a_surface_average(distance: float) -> None:
     a, b = 1.2, 0.7
     x, y = np.array([0.0, 0.0, 1.9]), distance * np.array([0.6, 0.64, -0.48]) + [0, 0, 1.9]
-    p, v = surface(a)
-    q, w = surface(b)
-    total = np.zeros((6, 6))
-    image = np.empty((6, 6))
-    for P, weight, left in zip(p[::7], v[::7] / v[::7].sum(), rigid(a, p[::7]), strict=True):
-        del P, weight, left
+    total, image = np.zeros((6, 6)), np.empty((6, 6))
     p, v = surface(a, 10)
     q, w = surface(b, 10)
     left, right = rigid(a, p), rigid(b, q)
@@ -143,7 +139,7 @@ def test_wall_part_is_a_surface_average(distance: float) -> None:
             inner += w[k] * image[:3, :3] @ right[k]
         total += v[i] * left[i].T @ inner
     found = block(x, y, a, b) - block(x, y, a, b, wall=False)
-    assert found == pytest.approx(total, abs=1e-6)
+    assert found == pytest.approx(total, abs=1e-7)
 
 
 @pytest.mark.parametrize(("a", "b", "distance"), [(1.0, 0.6, 1.9), (1.0, 0.6, 1.3), (0.5, 1.0, 0.7), (1.0, 0.4, 0.3)])
@@ -157,9 +153,11 @@ def test_unbounded_block_is_a_surface_average(a: float, b: float, distance: floa
         for c, w in zip((high + low) / 2 + (high - low) / 2 * nodes, (high - low) / 2 * weights, strict=True):
             for t in angle:
                 p = a * np.array([np.sqrt(1 - c * c) * np.cos(t), np.sqrt(1 - c * c) * np.sin(t), c])
-                r = p + [0, 0, distance]
+                r = p + np.array([0, 0, distance])
                 s = max(np.linalg.norm(r), b)  # inside, the flow is that of the rigid surface
-                flow = np.eye(3) / s + np.outer(r, r) / s**3 + b * b / 3 * (np.eye(3) / s**3 - 3 * np.outer(r, r) / s**5)
+                flow = (
+                    np.eye(3) / s + np.outer(r, r) / s**3 + b * b / 3 * (np.eye(3) / s**3 - 3 * np.outer(r, r) / s**5)
+                )
                 if np.linalg.norm(r) < b:
                     flow = 4 / (3 * b) * np.eye(3)
                 total += w / 16 * rigid(a, p[None])[0].T @ np.hstack([flow, -cross_of(r) / s**3])

@@ -53,7 +53,7 @@ def _extend(basis: _Basis, k: int, image: Array) -> None:
     for i, (c, s) in enumerate(basis.rotations[:k]):
         column[i], column[i + 1] = c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]
     length = float(np.hypot(column[k], below))
-    c, s = (column[k] / length, below / length) if length > 0 else (1.0, 0.0)
+    c, s = (column[k] / length, below / length) if length > 0 else (0.0, 1.0)  # A v = 0 helps nothing
     column[k] = length
     basis.rotations[k] = c, s
     basis.triangle[: k + 1, k] = column
@@ -81,7 +81,13 @@ def _cycle(apply: Operator, residual: Array, goal: float, length: int) -> tuple[
 
 
 def gmres(
-    apply: Operator, b: Array, *, start: Array | None = None, tolerance: float = 1e-10, restart: int = 40, most: int = 400
+    apply: Operator,
+    b: Array,
+    *,
+    start: Array | None = None,
+    tolerance: float = 1e-10,
+    restart: int = 40,
+    most: int = 400,
 ) -> Solution:
     """Solve A x = b.
 

@@ -12,7 +12,7 @@ the same, also where spheres overlap or one holds the other, and never below the
 Unbounded fluid: Rotne and Prager, J. Chem. Phys. 50 (1969) 4831; all radii and overlaps: Zuk, Wajnryb, Mizerski and
 Szymczak, J. Fluid Mech. 741 (2014) R5, equations 7 to 9.
 
-Wall z = 0: with J = diag(1, 1, -1), the wall adds to any Stokes field (u, p) of sources above it the field (Lorentz 1907)
+Wall z = 0: with J = diag(1, 1, -1), the wall adds to any Stokes field (u, p) of sources above it (Lorentz 1907)
 
     u*(x) = -u(Jx) + 2z J∇u_z(Jx) + (z²/η) J∇p(Jx),
 

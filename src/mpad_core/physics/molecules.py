@@ -17,21 +17,24 @@ class Sites:
     kind: Indices  # (S,)
 
 
+def site_counts(problem: Problem) -> Indices:
+    """Give how many molecules of each kind each cell has (N, kinds): density times the area of the smooth sphere."""
+    area = 4 * np.pi * problem.radii**2
+    counts: Indices = np.rint(problem.site_densities * area[:, None]).astype(np.int64)
+    return counts
+
+
 def place_sites(problem: Problem) -> Sites:
     """Place the molecules of every cell.
 
-    Density times the area of the smooth sphere gives their number. Draws are keyed by the cell's name, so a cell has
-    the same molecules whichever other cells are there.
+    Draws are keyed by the cell's name, so a cell has the same molecules whichever other cells are there.
     """
     key = key_of(problem.seed)
     arms: list[Array] = [np.zeros((0, 3))]
     kinds: list[Indices] = [np.zeros(0, np.int64)]
-    counts = [0]
+    counts = site_counts(problem)
     for cell, name in enumerate(problem.names):
-        area = 4 * np.pi * problem.radii[cell] ** 2
-        count = 0
-        for kind, density in enumerate(problem.site_densities[cell]):
-            number = round(float(density) * area)
+        for kind, number in enumerate(counts[cell]):
             draws = np.empty((number, 2))
             fill_uniform(key, int(Stream.RECEPTORS), identity_of(name), kind << 40, draws)
             cosine, azimuth = 2 * draws[:, 0] - 1, 2 * np.pi * draws[:, 1]
@@ -39,9 +42,8 @@ def place_sites(problem: Problem) -> Sites:
             shell = problem.radii[cell] + problem.roughness[cell]
             arms.append(shell * np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], axis=1))
             kinds.append(np.full(number, kind, np.int64))
-            count += number
-        counts.append(count)
-    return Sites(arm=np.concatenate(arms), first=np.cumsum(counts), kind=np.concatenate(kinds))
+    first = np.concatenate([[0], np.cumsum(counts.sum(axis=1))]).astype(np.int64)
+    return Sites(arm=np.concatenate(arms), first=first, kind=np.concatenate(kinds))
 
 
 def identity_of(name: str) -> np.uint64:

@@ -8,6 +8,7 @@ from attrs import evolve
 from mpad_core.arrays import Array
 from mpad_core.interfaces.values import Configuration
 from mpad_core.physics.coupling import coupler, lone_cell
+from mpad_core.physics.molecules import site_counts
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, no_bonds
 from mpad_core.running.march import make_ready, march
@@ -78,11 +79,7 @@ def _placed(problem: Problem, state: State, rolled: State, cell: int) -> State:
     """Put one prepared cell into the state of all."""
     shift = problem.start[cell] - rolled.centres[0]
     shift[2] = 0.0
-    first_site = sum(
-        round(float(density) * 4 * np.pi * problem.radii[i] ** 2)
-        for i in range(cell)
-        for density in problem.site_densities[i]
-    )
+    first_site = int(site_counts(problem)[:cell].sum())
     own = rolled.bonds
     bonds = BondList(
         cell=np.concatenate([state.bonds.cell, np.full(len(own), cell)]),

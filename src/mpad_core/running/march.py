@@ -11,14 +11,18 @@ from typing import Any
 import numpy as np
 from attrs import evolve, frozen
 
+from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import BOND_EVENT, Configuration
+from mpad_core.numerics.tables import value
 from mpad_core.physics.coupling import Coupler, Coupling, coupler, lone_cell
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State
 from mpad_core.running import assembly, pace
 from mpad_core.running.burst import NO_BALANCE, NOT_POSITIVE, ROOM_NEEDED, burst
 from mpad_core.running.layout import Dice, Limits, Motion
+from mpad_core.running.moving import refresh_turns
+from mpad_core.running.reacting import TENSION, length_of
 
 _EVENTS = 4096  # room to begin with; it grows
 
@@ -31,6 +35,17 @@ class Machine:
     fixed: assembly.Fixed
     pace: pace.Pace
     coupler: Coupler
+
+    def lengths_and_tensions(self, state: State) -> tuple[Array, Array]:
+        """Give the length (µm) and tension (pN) of every living bond."""
+        bonds, turns = state.bonds, np.empty((len(state.wall_gaps), 3, 3))
+        motion = assembly.motion_of(state)
+        refresh_turns(motion, turns)
+        laid = assembly.bond_room(bonds, len(bonds))
+        lengths = np.array([length_of(b, laid, self.fixed.molecules, motion, turns) for b in range(len(bonds))])
+        tables = self.fixed.species.tables
+        tensions = [value(tables, k, TENSION, x) for k, x in zip(bonds.species, lengths, strict=True)]
+        return lengths, np.array(tensions)
 
 
 def make_ready(problem: Problem) -> Machine:
@@ -130,7 +145,8 @@ def _next(
     done = state.step + steps
     now = (done - state.zero) * machine.pace.sub_step
     lasted = steps * machine.pace.sub_step
-    events["time"] = (events["step"] - state.zero) * machine.pace.sub_step
+    events["step"] -= state.zero
+    events["time"] = events["step"] * machine.pace.sub_step
     moved = motion.centre - state.centres
     following = evolve(
         state,

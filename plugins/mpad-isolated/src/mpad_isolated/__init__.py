@@ -6,6 +6,7 @@ Light: what needs numba is imported in `plan`.
 from typing import Any, ClassVar
 
 from attrs import frozen
+
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import AccuracyLevel, Array, Configuration, Motion, Setting, SolverTraits
 from mpad_core.plugins.hookspecs import hookimpl

@@ -1,20 +1,23 @@
 """Spheres alone: their mobilities and their motion in the flow."""
 
 import math
+from typing import Any
 
 import numpy as np
 from attrs import frozen
-from mpad_core.arrays import Array, Indices
+
+from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.wall_functions import wall_mobility, wall_shear_load
-
 from mpad_isolated.neglected import error_of
 
 
 @compiled
-def lone_spheres(centres: Array, radii: Array, gaps: Array, viscosity: float, rate: float, wall: bool) -> tuple[Array, Array]:
+def lone_spheres(
+    centres: Array, radii: Array, gaps: Array, viscosity: float, rate: float, wall: bool
+) -> tuple[Array, Array]:
     """Give mobilities (N, 6, 6) and load-free velocities (N, 6) in the flow (rate z, 0, 0).
 
     With a wall the exact functions of the gap (bispherical series, see `mpad_core.numerics.wall_functions`); without,
@@ -48,9 +51,7 @@ class Plan:
         """Check the configuration and look up."""
         fluid, at = self.setting, configuration
         refuse_bad(at, fluid.wall)
-        mobility, free = lone_spheres(
-            at.centres, at.radii, at.wall_gaps, fluid.viscosity, fluid.shear_rate, fluid.wall
-        )
+        mobility, free = lone_spheres(at.centres, at.radii, at.wall_gaps, fluid.viscosity, fluid.shear_rate, fluid.wall)
         return Alone(setting=fluid, configuration=at, mobility=mobility, free=free)
 
 
@@ -90,7 +91,7 @@ def refuse_bad(configuration: Configuration, wall: bool) -> None:
         _refuse("gap {} µm: it touches or cuts the wall", gaps, ~((gaps > 0) & np.isfinite(gaps)))
 
 
-def _refuse(fault: str, values: Array, bad: Array) -> None:
-    faulty: Indices = np.flatnonzero(bad)
+def _refuse(fault: str, values: Array, bad: Any) -> None:
+    faulty = np.flatnonzero(bad)
     if faulty.size:
         raise RefusedError(f"isolated: sphere {faulty[0]}: " + fault.format(values[faulty[0]].tolist()))

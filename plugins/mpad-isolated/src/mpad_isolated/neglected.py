@@ -1,6 +1,6 @@
 """How wrong isolated spheres may be: an estimate of what the others would do to each; compiled.
 
-Leading terms of what sphere j does to sphere i at distance r: its force F_j moves i by up to 2 F_j/(8πη r), its stresslet
+Leading terms of what sphere j does to sphere i at distance r: its force F moves i by up to 2 F/(8πη r), its stresslet
 in the rate of strain E by 5/2 b³ E/r² (Einstein), E being half the shear rate plus that of its force's own image,
 2 F/(8πη (2h)²); a wall cuts both down by 12 h h'/r² (Blake's far field). Nearly touching spheres lose their relative
 speed, by the share 1/(1 + x) with x = gap (a+b)/(ab). Forces often point the same way, so what they do is added
@@ -15,6 +15,7 @@ import math
 
 import numba
 import numpy as np
+
 from mpad_core.arrays import Array
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.numerics.compiled import compiled, compiled_parallel

@@ -6,6 +6,7 @@ Light: what needs numba is imported in `plan`.
 from typing import Any, ClassVar
 
 from attrs import field, frozen, validators
+
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import AccuracyLevel, Array, Configuration, Motion, Setting, SolverTraits
 from mpad_core.plugins.hookspecs import hookimpl
@@ -31,7 +32,8 @@ class RotnePragerBlake:
     name: ClassVar[str] = "rpb"
     traits: ClassVar[SolverTraits] = SolverTraits(
         levels=(
-            AccuracyLevel(parameters=(("lone_sphere", "exact"),), error=0.3),
+            # free motion in shear, two to four cells down to gaps of 1e-3 radii: 0.53 at worst, 0.04 in the median
+            AccuracyLevel(parameters=(("lone_sphere", "exact"),), error=0.6),
             AccuracyLevel(parameters=(("lone_sphere", "blake"),), error=1.0),
         )
     )

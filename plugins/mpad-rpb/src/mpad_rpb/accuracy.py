@@ -12,20 +12,20 @@ Four things are left out, and their parts are added as if independent.
 
 Strains and stresslets add up as if their directions were independent. Against exact solutions (28 cases of two to four
 spheres, radii 1 to 0.01, gaps 1e-3 to 5) the estimate bounds the true error of free motion in shear and of motion under
-loads in shear always, at 2.1 and 2.9 times the truth in the median; under random loads without flow in 98 % of 560 cases
-(4.6 times), under one single force or torque in 93 % of 372 (4.7 times); what it misses are contacts of spheres of radii
-one to ten, by less than a factor of two. For more than four spheres there was nothing to compare with.
+loads in shear always, at 2.1 and 2.9 times the truth in the median; under random loads without flow in 98 % of 560
+cases (4.6 times), under one single force or torque in 93 % of 372 (4.7 times). What it misses are contacts of spheres
+of radii one to ten, by less than a factor of two. For more than four spheres there was nothing to compare with.
 """
 
 import math
 
 import numba
 import numpy as np
+
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled, compiled_parallel
 from mpad_core.numerics.stokeslets import self_mobilities
 from mpad_core.numerics.wall_functions import wall_mobility, wall_shear_load
-
 from mpad_rpb.scene import Spheres
 
 SERIAL = 64  # spheres; for fewer, starting the threads costs more than the work
@@ -34,7 +34,7 @@ LOOKED_UP = 1e-12  # relative error of the table of wall functions, all that a l
 
 @compiled
 def _square(v: Array) -> float:
-    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
+    return float(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
 
 
 @compiled
@@ -103,9 +103,7 @@ def _missing(i: int, centres: Array, radii: Array, strain: Array, velocity: Arra
 
 
 @compiled
-def _missing_of_few(
-    centres: Array, radii: Array, push: Array, velocity: Array, shear_rate: float, wall: bool
-) -> Array:
+def _missing_of_few(centres: Array, radii: Array, push: Array, velocity: Array, shear_rate: float, wall: bool) -> Array:
     strain, out = np.empty(len(radii)), np.empty((len(radii), 4))
     for i in range(len(radii)):
         strain[i] = _strain(i, centres, radii, push, shear_rate, wall)

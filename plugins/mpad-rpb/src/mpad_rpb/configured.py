@@ -1,11 +1,13 @@
 """From a configuration to what solves it: refuse first, then matrix for few spheres, products for many."""
 
+from typing import Any
+
 import numpy as np
 from attrs import frozen
+
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Setting
-
 from mpad_rpb.dense import Dense
 from mpad_rpb.matrix_free import MatrixFree
 from mpad_rpb.scene import Spheres
@@ -40,9 +42,9 @@ def refuse_bad(configuration: Configuration, setting: Setting, exact: bool) -> N
     """
     radii, heights, gaps = configuration.radii, configuration.centres[:, 2], configuration.wall_gaps
     total = configuration.centres.sum() + radii.sum() + gaps.sum()
-    if total - total == 0 and radii.min() > 0 and (not setting.wall or heights.min() > 0):
-        if not exact or gaps.min() > 0:
-            return
+    above = (not setting.wall or heights.min() > 0) and (not exact or gaps.min() > 0)
+    if total - total == 0 and radii.min() > 0 and above:  # one pass over the good; what follows names the bad
+        return
     _refuse("centre {} is not finite", configuration.centres, ~np.isfinite(configuration.centres).all(axis=1))
     _refuse("radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
     if setting.wall:
@@ -52,7 +54,7 @@ def refuse_bad(configuration: Configuration, setting: Setting, exact: bool) -> N
         _refuse("gap {} µm: it touches or cuts the wall, which needs lone_sphere = 'blake'", gaps, ~(gaps > 0))
 
 
-def _refuse(fault: str, values: Array, bad: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> None:
+def _refuse(fault: str, values: Array, bad: Any) -> None:
     if bad.any():
         first = int(np.argmax(bad))
         raise RefusedError(f"rpb: sphere {first}: " + fault.format(values[first].tolist()))

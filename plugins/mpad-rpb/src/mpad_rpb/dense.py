@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 from attrs import frozen
+
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Motion, Report
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.stokeslets import grand_mobility
-
 from mpad_rpb.accuracy import error_of
 from mpad_rpb.lone import lone_corrections
 from mpad_rpb.scene import Spheres
@@ -133,4 +133,6 @@ class Dense:
         velocity += self.free[:, None]
         if not math.isfinite(velocity.sum()):
             raise RefusedError("rpb: the loads are not finite")
-        return Motion(velocity=velocity.reshape(loads.shape), report=Report(error=error_of(self.spheres, flat, velocity)))
+        return Motion(
+            velocity=velocity.reshape(loads.shape), report=Report(error=error_of(self.spheres, flat, velocity))
+        )

@@ -1,6 +1,7 @@
-"""What a lone sphere above the wall lacks in this method: resistance and ambient load up to the exact ones; compiled."""
+"""What a lone sphere above the wall lacks in this method: resistance and load up to the exact ones; compiled."""
 
 import numpy as np
+
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.stokeslets import self_mobilities

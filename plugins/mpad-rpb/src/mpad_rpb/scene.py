@@ -2,9 +2,9 @@
 
 import numpy as np
 from attrs import frozen
+
 from mpad_core.arrays import Array
 from mpad_core.interfaces.values import Configuration, Setting
-
 from mpad_rpb.lone import ambient_velocities
 
 

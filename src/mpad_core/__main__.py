@@ -1,0 +1,5 @@
+"""``python -m mpad_core`` is ``mpad``."""
+
+from mpad_core.cli import main
+
+main()

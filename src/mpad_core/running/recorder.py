@@ -1,0 +1,127 @@
+"""Everybody who listens to a march: the trajectory, the observers, the checkpoint.
+
+Order matters: rows are flushed to the trajectory first, then the checkpoint that counts them takes the old one's place.
+Whatever instant the process dies at, the checkpoint names rows that exist, and resuming cuts off the rest.
+"""
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import frozen
+
+from mpad_core.interfaces.observer import Frame, Observer
+from mpad_core.interfaces.values import BOND_EVENT
+from mpad_core.physics.measures import Hazards, hazards
+from mpad_core.physics.problem import Problem
+from mpad_core.physics.state import State, to_arrays
+from mpad_core.records.checkpoint import write_checkpoint
+from mpad_core.records.hdf5 import TrajectoryWriter
+from mpad_core.records.header import BondSpecies, TrajectoryHeader
+from mpad_core.running.frames import frame_of, frames
+from mpad_core.running.march import Machine
+from mpad_core.running.schedules import Cadence, Schedule
+
+TRAJECTORY, CHECKPOINT = "trajectory.h5", "checkpoint.npz"
+
+
+@frozen(kw_only=True)
+class Recording:
+    """What is to be kept of a run."""
+
+    scene: str  # the resolved scene's text
+    title: str
+    cadence: Cadence
+    quantities: tuple[str, ...]
+    observers: Sequence[Observer] = ()
+
+
+@frozen(kw_only=True, eq=False)
+class Recorder:
+    """Writes a run into its directory."""
+
+    problem: Problem
+    recording: Recording
+    directory: Path
+    hazards: Hazards
+    schedule: Schedule
+    writer: TrajectoryWriter
+
+    def hear(self, before: State, after: State) -> None:
+        """Record what is due between two states, and flush it."""
+        due = list(frames(self.problem, self.hazards, self.schedule, before, after))
+        for frame in due:
+            self.record(frame)
+        self.writer.append_events(after.events)
+        if due or len(after.events):
+            self.writer.flush()
+
+    def record(self, frame: Frame) -> None:
+        """Append one frame with what the observers see in it."""
+        self.writer.append(frame, [value for observer in self.recording.observers for value in observer.see(frame)])
+
+    def keep(self, state: State, ended: str = "") -> None:
+        """Write the checkpoint; `ended` says why the run is over, once it is."""
+        arrays = to_arrays(state) | self.schedule.memory() | {"ended": np.array(ended)}
+        rows = {f"rows.{name}": np.array(count) for name, count in self.writer.rows().items()}
+        write_checkpoint(self.directory / CHECKPOINT, arrays | rows)
+
+
+def begin_recording(recording: Recording, machine: Machine, directory: Path, state: State) -> Recorder:
+    """Make the trajectory, with the frame of time zero in it, and the first checkpoint."""
+    problem = machine.problem
+    path = directory / TRAJECTORY
+    path.unlink(missing_ok=True)  # left by a process that died before its first checkpoint
+    fields = [declared for observer in recording.observers for declared in observer.fields(problem.names)]
+    recorder = Recorder(
+        problem=problem,
+        recording=recording,
+        directory=directory,
+        hazards=hazards(problem),
+        schedule=Schedule.starting(recording.cadence, state),
+        writer=TrajectoryWriter.create(path, _header(recording, problem), fields),
+    )
+    recorder.record(frame_of(problem, recorder.hazards, state, state, 1.0))
+    recorder.writer.append_events(_bonds_at_zero(machine, state))
+    recorder.writer.flush()
+    recorder.keep(state)
+    return recorder
+
+
+def go_on_recording(recording: Recording, problem: Problem, directory: Path, kept: Mapping[str, Any]) -> Recorder:
+    """Go on with a trajectory from the rows that the checkpoint counts."""
+    rows = {name.removeprefix("rows."): int(count) for name, count in kept.items() if name.startswith("rows.")}
+    return Recorder(
+        problem=problem,
+        recording=recording,
+        directory=directory,
+        hazards=hazards(problem),
+        schedule=Schedule.remembering(recording.cadence, kept),
+        writer=TrajectoryWriter.resume(directory / TRAJECTORY, rows),
+    )
+
+
+def _header(recording: Recording, problem: Problem) -> TrajectoryHeader:
+    return TrajectoryHeader(
+        cells=problem.names,
+        kinds=problem.kinds,
+        radii=tuple(problem.radii),
+        seed=problem.seed,
+        scene=recording.scene,
+        bonds=tuple(BondSpecies(name=s.name, reach=s.reach, compression=s.compression) for s in problem.species),
+        quantities=recording.quantities,
+        title=recording.title,
+        version=version("mpad-core"),
+    )
+
+
+def _bonds_at_zero(machine: Machine, state: State) -> Any:
+    """List the bonds that a preparation left, as formed at time zero, so that the table of events is complete."""
+    bonds, events = state.bonds, np.zeros(len(state.bonds), BOND_EVENT)
+    events["cell"], events["species"], events["ligand"] = bonds.cell, bonds.species, bonds.ligand
+    events["receptor"] = bonds.site - machine.fixed.molecules.first[bonds.cell]
+    events["anchor_x"], events["anchor_y"] = bonds.anchor[:, 0], bonds.anchor[:, 1]
+    events["length"], events["force"] = machine.lengths_and_tensions(state)
+    return events

@@ -1,0 +1,175 @@
+"""One run into one directory: march, record, keep checkpoints, stop in order, go on bit for bit."""
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from attrs import field, frozen
+
+from mpad_core.interfaces.errors import InputError, InterruptedRunError, MpadError, PartError
+from mpad_core.physics.problem import Problem
+from mpad_core.physics.state import State, from_arrays
+from mpad_core.records.checkpoint import read_checkpoint
+from mpad_core.records.log import RunLog
+from mpad_core.records.progress import Progress
+from mpad_core.records.room import NearlyFullError
+from mpad_core.running.initial import initial_state
+from mpad_core.running.march import Machine, make_ready, march
+from mpad_core.running.recorder import (
+    CHECKPOINT,
+    TRAJECTORY,
+    Recorder,
+    Recording,
+    begin_recording,
+    go_on_recording,
+)
+from mpad_core.running.stopping import Signals, StopWhen, first_that_holds, listening
+
+CHECKPOINT_EVERY = 2.0  # s of wall time
+
+
+@frozen(kw_only=True)
+class Order:
+    """What a single run is to do."""
+
+    problem: Problem
+    recording: Recording
+    until: float  # s
+    stop_when: Sequence[StopWhen] = ()
+    checkpoint_every: float = CHECKPOINT_EVERY
+
+
+@frozen(kw_only=True)
+class Outcome:
+    """How a single run ended."""
+
+    state: State = field(repr=False)
+    ended: str  # "time", or the condition that held
+    sub_step: float  # s
+    prepared_in: float  # s of wall time before the first step of this process
+    marched_in: float  # s of wall time of this process's march
+    outer_steps: int  # of this process
+
+
+def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Progress) -> Outcome:
+    """Run into a directory, whose lock the caller holds, or go on with what is there.
+
+    Raises
+    ------
+    InputError
+        If the directory holds a run and `resume` was not asked for.
+    InterruptedRunError
+        After SIGINT or SIGTERM, with a checkpoint written.
+    PartError
+        If a part raises, naming the step.
+    DiskFullError
+        With a checkpoint written where there was room.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    began = time.monotonic()
+    with listening() as signals, _named_parts(order.problem, "before step one"):
+        machine = make_ready(order.problem)
+        recorder, state, ended = _begin(order, machine, directory, resume, signals, log)
+        prepared = time.monotonic()
+        with _closed(recorder):
+            state, ended, steps = _go_on(order, machine, recorder, state, ended, signals, bar)
+    return Outcome(
+        state=state,
+        ended=ended,
+        sub_step=machine.pace.sub_step,
+        prepared_in=prepared - began,
+        marched_in=time.monotonic() - prepared,
+        outer_steps=steps,
+    )
+
+
+@contextmanager
+def _named_parts(problem: Problem, when: str) -> Iterator[None]:
+    """Turn whatever a plugin raises into a PartError that names the parts and the moment."""
+    try:
+        yield
+    except MpadError:
+        raise
+    except Exception as error:
+        names = [problem.solver.name, *(s.model.name for s in problem.species)]
+        what = f"a part failed {when} (parts: {', '.join(names)}): {type(error).__name__}: {error}"
+        raise PartError(what) from error
+
+
+@contextmanager
+def _closed(recorder: Recorder) -> Iterator[None]:
+    """End trajectory and observers in order; a trajectory that an error has broken is let go of."""
+    try:
+        yield
+        recorder.writer.close()
+    except MpadError:
+        try:
+            recorder.writer.close()
+        except MpadError:
+            recorder.writer.abandon()
+        raise
+    finally:
+        for observer in recorder.recording.observers:
+            observer.close()
+
+
+def _begin(
+    order: Order, machine: Machine, directory: Path, resume: bool, signals: Signals, log: RunLog
+) -> tuple[Recorder, State, str]:
+    """Give the recorder, the state to march from (a checkpoint's, or time zero's), and why the run is over if it is."""
+    checkpoint = directory / CHECKPOINT
+    if not resume and (checkpoint.exists() or (directory / TRAJECTORY).exists()):
+        raise InputError(f"{directory}: holds a run already; add --resume to go on with it, or choose another with -o")
+    if not checkpoint.exists():
+        log.write("preparing", run=directory.name, cells=order.problem.names)
+        state = _prepared(order.problem, signals)
+        return begin_recording(order.recording, machine, directory, state), state, ""
+    kept = read_checkpoint(checkpoint)
+    state = from_arrays(kept)
+    if len(state.wall_gaps) != len(order.problem.names):
+        raise InputError(f"{checkpoint}: holds {len(state.wall_gaps)} cells, the scene {len(order.problem.names)}")
+    log.write("resumed", run=directory.name, simulated=state.time)
+    return go_on_recording(order.recording, order.problem, directory, kept), state, str(kept["ended"])
+
+
+def _prepared(problem: Problem, signals: Signals) -> State:
+    """Give the state at time zero; cells that first roll alone do so here."""
+
+    def hear(name: str, state: State) -> None:
+        if signals.received:
+            raise InterruptedRunError(f"interrupted while {name!r} first rolled alone; start anew", signals.received)
+
+    return initial_state(problem, hear)
+
+
+def _go_on(
+    order: Order, machine: Machine, recorder: Recorder, state: State, ended: str, signals: Signals, bar: Progress
+) -> tuple[State, str, int]:
+    """March to the end; give the last state, why it ended, and how many outer steps it took."""
+    if ended:
+        return state, ended, 0
+    kept_at, steps, before = time.monotonic(), 0, state
+    marching = march(machine, state, order.until)
+    next(marching)
+    while not ended:
+        with _named_parts(order.problem, f"at t = {before.time:.6g} s, step {before.step - before.zero}"):
+            after = next(marching, None)
+        if after is None:
+            break
+        try:
+            recorder.hear(before, after)
+        except NearlyFullError:
+            recorder.keep(after)
+            raise
+        before, steps = after, steps + 1
+        bar.update(after.time, after.step - after.zero)
+        ended = first_that_holds(order.stop_when, order.problem, after) or ""
+        if signals.received:
+            recorder.keep(after)
+            raise InterruptedRunError(f"interrupted at t = {after.time:.6g} s; go on with --resume", signals.received)
+        if time.monotonic() - kept_at > order.checkpoint_every:
+            recorder.keep(after)
+            kept_at = time.monotonic()
+    recorder.keep(before, ended or "time")
+    return before, ended or "time", steps

@@ -1,0 +1,69 @@
+"""The picture of a passage."""
+
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from mpad_core.studies.passage import Path, contribution
+
+_INK, _GREY, _RED = "#1b4965", "#8d99ae", "#c1121f"
+
+
+def draw_passages(
+    paths: Sequence[Path], alone: Sequence[Path], on_rates: Sequence[float], title: str, file: FilePath
+) -> None:
+    """Draw δ(Δx) with and without the other cell, their difference, and the capture hazard; write a PNG."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    rows = 3 if paths[0].problem.species else 2
+    figure = Figure(figsize=(7.5, 2.9 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(rows, 1, sharex=True)
+    _draw_overlap(panels[0], paths, alone)
+    if alone:
+        _draw_contribution(panels[1], paths[0], alone[0])
+    if rows == 3:
+        _draw_hazard(panels[2], paths[0], on_rates)
+    cell = paths[0].problem.names[paths[0].cell]
+    panels[0].set_title(title, loc="left", fontsize=11)
+    panels[-1].set_xlabel(f"Δx of {cell} (µm)")
+    figure.savefig(file, dpi=130)
+
+
+def _draw_overlap(panel: Any, paths: Sequence[Path], alone: Sequence[Path]) -> None:
+    for i, path in enumerate(alone):
+        panel.plot(path.dx, 1e3 * path.overlap, color=_GREY, lw=1.2, ls="--", label=None if i else "alone")
+    for i, path in enumerate(paths):
+        panel.plot(path.dx, 1e3 * path.overlap, color=_INK, lw=1.5, label=None if i else "past the other cell")
+        if np.isfinite(path.caught_at):
+            at = np.interp(path.caught_at, path.times, path.dx), np.interp(path.caught_at, path.times, path.overlap)
+            panel.plot(at[0], 1e3 * at[1], "o", color=_RED, ms=5)
+    panel.axhline(0, color="black", lw=0.6)
+    panel.set_ylabel("receptor overlap δ (nm)")
+    low = min(float(np.min(path.overlap)) for path in (*paths, *alone))
+    panel.set_ylim(1e3 * low * 1.25 - 3, max(-1e3 * low * 2, 20.0))
+    panel.legend(frameon=False, fontsize=9)
+
+
+def _draw_contribution(panel: Any, path: Path, alone: Path) -> None:
+    panel.plot(path.dx, -1e3 * contribution(path, alone), color=_INK, lw=1.5)
+    panel.axhline(0, color="black", lw=0.6)
+    panel.set_yscale("symlog", linthresh=5)
+    panel.set_ylabel("δ less δ alone,\nsame place (nm)")
+
+
+def _draw_hazard(panel: Any, path: Path, on_rates: Sequence[float]) -> None:
+    base = [species.on_rate for species in path.problem.species]
+    speed = np.maximum(np.abs(path.speed), 1e-12)
+    shades = [str(shade) for shade in np.linspace(0.0, 0.65, 1 + len(on_rates))]
+    for shade, rate in zip(shades, (None, *on_rates), strict=True):
+        per_length = path.hazard(rate) / speed
+        label = "/".join(f"{value:g}" for value in base) if rate is None else f"{rate:g}"
+        panel.plot(path.dx, np.where(per_length > 0, per_length, np.nan), color=shade, lw=1.3, label=f"{label} 1/s")
+    panel.set_yscale("log")
+    panel.set_ylim(1e-6, None)
+    panel.set_ylabel("capture hazard (1/µm)")
+    panel.legend(title="on-rate", frameon=False, fontsize=9, ncols=1 + len(on_rates))

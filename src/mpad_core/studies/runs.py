@@ -1,0 +1,270 @@
+"""A scene run from beginning to end: one run, or a passage with its controls and seeds, and what came out of it."""
+
+import json
+import time
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from attrs import frozen
+
+from mpad_core.interfaces.errors import InputError
+from mpad_core.physics.problem import Problem
+from mpad_core.records.lock import locked
+from mpad_core.records.log import RunLog
+from mpad_core.records.progress import progress
+from mpad_core.records.reader import read_trajectory
+from mpad_core.records.trajectory import Trajectory
+from mpad_core.running.recorder import TRAJECTORY, Recording
+from mpad_core.running.run import CHECKPOINT_EVERY, Order, Outcome, run_one
+from mpad_core.running.schedules import Cadence
+from mpad_core.running.stopping import StopWhen
+from mpad_core.scene.compose import compose
+from mpad_core.scene.spec import Scene
+from mpad_core.scene.writing import resolved_toml
+from mpad_core.studies.passage import describe, path_of
+
+SCENE, SUMMARY, LOG, PICTURE = "scene.toml", "summary.json", "run.jsonl", "passage.png"
+
+
+@frozen(kw_only=True, eq=False)
+class Case:
+    """One single run of a scene."""
+
+    folder: str  # below the run directory; "" for the directory itself
+    seed: int
+    control: bool
+    problem: Problem
+
+
+@frozen(kw_only=True, eq=False)
+class Result:
+    """What one case gave."""
+
+    case: Case
+    outcome: Outcome
+    trajectory: Trajectory
+
+
+def cases(scene: Scene) -> Iterator[Case]:
+    """Yield the single runs that a scene asks for: every seed, each followed by its control."""
+    study = scene.passage
+    for replicate in range(study.seeds if study else 1):
+        problem = compose(scene, replicate)
+        folder = f"seed-{problem.seed}" if replicate else ""
+        yield Case(folder=folder, seed=problem.seed, control=False, problem=problem)
+        if study and study.control:
+            staying = [i for i, name in enumerate(problem.names) if name not in study.past]
+            control = problem.only(staying)
+            yield Case(folder=str(Path(folder, "control")), seed=problem.seed, control=True, problem=control)
+
+
+def run(
+    scene: Scene, directory: str | PathLike[str], *, resume: bool = False, checkpoint_every: float = CHECKPOINT_EVERY
+) -> dict[str, Any]:
+    """Run a scene into a directory.
+
+    Parameters
+    ----------
+    scene
+        See `mpad_core.load_scene`.
+    directory
+        Made if it does not exist. It receives ``trajectory.h5`` (H5MD), ``checkpoint.npz``, ``scene.toml`` (resolved),
+        ``summary.json`` and ``run.jsonl``; a passage adds ``control/``, ``seed-<n>/`` and ``passage.png``.
+    resume
+        Go on with the run that the directory holds.
+    checkpoint_every
+        Wall time (s) between checkpoints.
+
+    Returns
+    -------
+    dict
+        The summary.
+
+    Raises
+    ------
+    InputError
+        If the directory holds a run and `resume` is not set, or another scene's run and it is.
+    BusyError
+        If another process is writing there.
+    InterruptedRunError, PartError, RefusedError, DiskFullError
+        As `mpad_core.running.run.run_one`.
+    """
+    root = Path(directory)
+    text = resolved_toml(scene)
+    todo = list(cases(scene))
+    root.mkdir(parents=True, exist_ok=True)
+    with locked(root):
+        _claim(root, text, resume)
+        with RunLog(root / LOG) as log:
+            began = time.monotonic()
+            log.write("started", scene=scene.title, runs=len(todo), resume=resume)
+            results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
+            summary = _summary(scene, results, time.monotonic() - began)
+            _write_whole(root / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+            if scene.passage:
+                _draw(scene, results, root / PICTURE)
+            log.write("finished", wall_s=time.monotonic() - began)
+    return summary
+
+
+def _claim(root: Path, text: str, resume: bool) -> None:
+    """Make the directory this scene's, or see that it is."""
+    there = root / SCENE
+    if not there.exists():
+        if (root / TRAJECTORY).exists():
+            raise InputError(f"{root}: holds a trajectory without its scene; choose another directory with -o")
+        _write_whole(there, text)
+    elif not resume:
+        raise InputError(f"{root}: holds a run already; add --resume to go on with it, or choose another with -o")
+    elif there.read_text() != text:
+        raise InputError(f"{there}: is of another scene or of other settings; --resume needs the very same scene")
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a file so that it is there whole or not at all."""
+    temporary = path.with_name(path.name + ".tmp")
+    temporary.write_text(text)
+    temporary.replace(path)
+
+
+def _run_case(
+    scene: Scene, text: str, case: Case, root: Path, resume: bool, checkpoint_every: float, log: RunLog
+) -> Result:
+    folder = root / case.folder
+    order = _order(scene, text, case, checkpoint_every)
+    with progress(order.until, log=log) as bar:
+        outcome = run_one(order, folder, resume=resume, log=log, bar=bar)
+    log.write("run ended", run=case.folder or ".", ended=outcome.ended, simulated=outcome.state.time)
+    return Result(case=case, outcome=outcome, trajectory=read_trajectory(folder / TRAJECTORY))
+
+
+def _order(scene: Scene, text: str, case: Case, checkpoint_every: float) -> Order:
+    problem, every = case.problem, scene.record.every
+    followed = (
+        scene.passage.cell
+        if scene.passage
+        else next((name for name, held in zip(problem.names, problem.held, strict=True) if not held), problem.names[0])
+    )
+    conditions = [
+        StopWhen(cell=c.cell, quantity=c.quantity, above=c.op == ">", value=c.value, text=str(c))
+        for c in scene.stop.when
+    ]
+    recording = Recording(
+        scene=text,
+        title=scene.title + (" (control)" if case.control else ""),
+        cadence=Cadence(time=every.time, dx=every.dx, cell=problem.names.index(followed)),
+        quantities=scene.record.what,
+        observers=tuple(part.instance for part in scene.record.observers),
+    )
+    return Order(
+        problem=problem,
+        recording=recording,
+        until=scene.stop.time,
+        stop_when=conditions,
+        checkpoint_every=checkpoint_every,
+    )
+
+
+def _cells(result: Result) -> dict[str, Any]:
+    """Describe every cell's run: mean speed and height, least overlap, captures."""
+    problem, state, path = result.case.problem, result.outcome.state, result.trajectory
+    duration = path.times[-1] - path.times[0]
+    described = {}
+    for i, name in enumerate(problem.names):
+        x, z = path.positions[:, i, 0], path.positions[:, i, 2]
+        lasting = duration > 0
+        speed = (x[-1] - x[0]) / duration if lasting else float("nan")
+        scale = problem.setting.shear_rate * problem.radii[i]
+        described[name] = {
+            "mean_speed_um_per_s": speed,
+            "mean_speed_over_gamma_a": speed / scale if scale else None,
+            "mean_height_um": np.trapezoid(z, path.times) / duration if lasting else z[0],
+            "least_overlap_nm": 1e3 * float(np.min(z - problem.zero_overlap[i])),
+            "bonds_at_end": int(state.bond_counts()[i]),
+            "caught_at_s": state.caught_since[i] if np.isfinite(state.caught_since[i]) else None,
+        }
+    return described
+
+
+def _summary(scene: Scene, results: list[Result], wall: float) -> dict[str, Any]:
+    first = results[0]
+    summary: dict[str, Any] = {
+        "title": scene.title,
+        "solver": scene.solver.name,
+        "effects": {effect.name: {"on": effect.on, "why": effect.why} for effect in first.case.problem.effects},
+        "bonds": {
+            s.name: {"model": s.model.name, "reach": s.reach, "compression": s.compression, "on_rate_per_s": s.on_rate}
+            for s in first.case.problem.species
+        },
+        "sub_step_s": first.outcome.sub_step,
+        "wall_s": wall,
+        "runs": [
+            {
+                "folder": result.case.folder or ".",
+                "seed": result.case.seed,
+                "control": result.case.control,
+                "ended": result.outcome.ended,
+                "time_s": result.outcome.state.time,
+                "cells": _cells(result),
+            }
+            for result in results
+        ],
+    }
+    if scene.passage:
+        summary["passage"] = _passage(scene, results)
+    plain: dict[str, Any] = _plain(summary)
+    return plain
+
+
+def _paths(scene: Scene, results: list[Result], control: bool) -> list[Any]:
+    assert scene.passage is not None
+    paths = []
+    for result in results:
+        if result.case.control == control:
+            problem, cell = result.case.problem, scene.passage.cell
+            caught = result.outcome.state.caught_since[problem.names.index(cell)]
+            paths.append(path_of(problem, result.trajectory, cell, float(caught)))
+    return paths
+
+
+def _passage(scene: Scene, results: list[Result]) -> dict[str, Any]:
+    """Describe every passage beside its control, and count the captures."""
+    assert scene.passage is not None
+    paths, alone = _paths(scene, results, False), _paths(scene, results, True)
+    beside = alone if alone else [None] * len(paths)
+    described = [describe(p, a, scene.passage.also_on_rates) for p, a in zip(paths, beside, strict=True)]
+    return {
+        "cell": scene.passage.cell,
+        "past": list(scene.passage.past),
+        "passages": described,
+        "caught": sum(passage["caught"] for passage in described),
+        "of": len(paths),
+        "caught_in_control": sum(bool(np.isfinite(path.caught_at)) for path in alone) if alone else None,
+        "controls": [describe(path, None, ()) for path in alone],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Turn numpy's numbers into Python's, and what is no number into null, which JSON knows."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.bool_ | bool):
+        return bool(value)
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.floating | float):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def _draw(scene: Scene, results: list[Result], file: Path) -> None:
+    from mpad_core.studies.pictures import draw_passages
+
+    assert scene.passage is not None
+    paths, alone = _paths(scene, results, False), _paths(scene, results, True)
+    draw_passages(paths, alone, scene.passage.also_on_rates, scene.title, file)
