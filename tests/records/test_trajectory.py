@@ -88,7 +88,7 @@ def test_each_dataset_with_a_unit_says_it(finished):
         bare = [
             name for name, item in file["mpad"].items() if isinstance(item, h5py.Dataset) and "unit" not in item.attrs
         ]
-        assert set(bare) == {"step", "scene", "quantities"}
+        assert set(bare) == {"step", "scene", "quantities", "row_sums", "bond_event_sums"}
         assert file["mpad/positions"].attrs["unit"] == "um"
         assert file["mpad/observers/tilt"].attrs["unit"] == "1"
         assert len(file["mpad/bond_events"].attrs["unit"].split()) == len(file["mpad/bond_events"].dtype.names)

@@ -1,8 +1,8 @@
 """The one decorator behind every compiled kernel, and the disk cache it uses.
 
 numba finds a stale kernel in its cache when a function that the kernel calls, in another file, was edited. The cache
-directory is therefore named by a hash of every source that can take part: the core, every installed plugin, numba,
-numpy and Python. It belongs to the user alone, since the cached files are pickles.
+directory is therefore named by a hash of every source that can take part: the core's lower rooms, every installed
+plugin, numba, numpy and Python. It belongs to the user alone, since the cached files are pickles.
 """
 
 import contextlib
@@ -16,8 +16,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+import numba
+
 P = ParamSpec("P")
 R = TypeVar("R")
+
+
+_CANNOT_TAKE_PART = {"scene", "records", "studies", "testing", "plugins"}  # no kernel imports from these rooms
 
 
 def _packages() -> Iterator[Path]:
@@ -32,6 +37,8 @@ def _fingerprint() -> str:
     digest = hashlib.sha256(f"{sys.version} {version('numba')} {version('numpy')}".encode())
     for package in _packages():
         for source in sorted(package.rglob("*.py")):
+            if package.name == "mpad_core" and source.relative_to(package).parts[0] in _CANNOT_TAKE_PART:
+                continue
             digest.update(str(source).encode())
             digest.update(source.read_bytes())
     return digest.hexdigest()[:20]
@@ -50,8 +57,7 @@ def _cache_directory() -> Path:
     return wanted
 
 
-os.environ["NUMBA_CACHE_DIR"] = str(_cache_directory())
-import numba  # noqa: E402  (the cache directory must be set before numba reads its configuration)
+numba.config.CACHE_DIR = str(_cache_directory())  # not the environment, which child processes would inherit
 
 
 def _forgiving(dispatcher: Any) -> Any:

@@ -1,6 +1,5 @@
 """What a trajectory file says it holds, checked against the layout: the way both to the reader and to salvage."""
 
-import os
 from typing import Any
 
 import h5py
@@ -11,17 +10,20 @@ from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.observer import FieldDeclaration
 from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.records.creation import CREATOR
+from mpad_core.records.guard import is_finished
 from mpad_core.records.header import BondSpecies, TrajectoryHeader
 from mpad_core.records.layout import (
     BOND_EVENTS,
+    EVENT_SUMS_PATH,
     EVENTS_PATH,
     FORMAT,
     FRAMES,
     OBSERVERS_PATH,
-    POSITION_PATH,
+    ROW_SUMS_PATH,
     Column,
     columns,
 )
+from mpad_core.records.sums import header_sum, whole_rows
 
 
 @frozen(kw_only=True, eq=False)
@@ -49,15 +51,32 @@ def contents(file: Any) -> Contents:
     header = _header(file)
     fields = _fields(file)
     made = columns(header, fields)
+    if _number(file, "/mpad", "sum") != header_sum(header, fields):
+        raise InputError("/mpad: what is written once is damaged, its sum is wrong")
     found = tuple(_expected(file, column.path, column.shape, column.dtype) for column in made)
     events = _expected(file, EVENTS_PATH, (), BOND_EVENT) if "bonds" in header.quantities else None
-    finished = not file.swmr_mode
-    rows = {FRAMES: min(map(len, found)), BOND_EVENTS: 0 if events is None else len(events)}
-    if not finished:
-        rows = _whole(file, events, _within_file(found, events, rows))
     return Contents(
-        header=header, fields=fields, columns=made, datasets=found, events=events, rows=rows, finished=finished
+        header=header,
+        fields=fields,
+        columns=made,
+        datasets=found,
+        events=events,
+        rows={FRAMES: _frames(file, made, found), BOND_EVENTS: _events(file, events)},
+        finished=is_finished(file),
     )
+
+
+def _frames(file: Any, made: tuple[Column, ...], found: tuple[Any, ...]) -> int:
+    sums = _expected(file, ROW_SUMS_PATH, (), "u4")
+    summed = tuple(dataset for column, dataset in zip(made, found, strict=True) if column.is_summed)
+    return _whole(summed, sums, min(map(len, (*found, sums))), is_finished(file))
+
+
+def _events(file: Any, events: Any | None) -> int:
+    if events is None:
+        return 0
+    sums = _expected(file, EVENT_SUMS_PATH, (), "u4")
+    return _whole((events,), sums, min(len(events), len(sums)), is_finished(file))
 
 
 def _check_format(file: Any) -> None:
@@ -106,34 +125,12 @@ def _plain(dtype: Any) -> str:
     return "bool" if dtype == np.bool_ else str(np.dtype(dtype).str.lstrip("<|="))
 
 
-def _within_file(datasets: tuple[Any, ...], events: Any | None, rows: dict[str, int]) -> dict[str, int]:
-    """Leave out rows that lie beyond the file's end, as a machine's death leaves them: HDF5 reads zeros there."""
-    frames = min(map(_first_beyond, datasets))
-    happened = 0 if events is None else _first_beyond(events)
-    return {FRAMES: min(rows[FRAMES], frames), BOND_EVENTS: min(rows[BOND_EVENTS], happened)}
-
-
-def _first_beyond(dataset: Any) -> int:
-    if dataset.chunks is None:
-        raise InputError(f"{dataset.name}: is not stored in pieces, as a dataset that grows must be")
-    ends: list[tuple[int, int]] = []
-    dataset.id.chunk_iter(lambda chunk: ends.append((chunk.chunk_offset[0], chunk.byte_offset + chunk.size)))
-    size = os.stat(dataset.file.filename).st_size
-    return min((row for row, end in ends if end > size), default=len(dataset))
-
-
-def _whole(file: Any, events: Any | None, rows: dict[str, int]) -> dict[str, int]:
-    """Leave out rows at the end that the writer had announced but not written: they hold the fill value."""
-    frames = _written(file[f"{POSITION_PATH}/time"][: rows[FRAMES]])
-    while frames and np.isnan(file["/mpad/positions"][frames - 1]).all():
-        frames -= 1
-    happened = 0 if events is None else _written(events.fields("time")[:])
-    return {FRAMES: frames, BOND_EVENTS: happened}
-
-
-def _written(times: Any) -> int:
-    missing = np.flatnonzero(np.isnan(times))
-    return int(missing[0]) if len(missing) else len(times)
+def _whole(found: tuple[Any, ...], sums: Any, rows: int, finished: bool) -> int:
+    """Count the rows whose sum is right: all of a finished file's, of another those up to where it was cut off."""
+    whole = whole_rows(found, sums, rows)
+    if finished and whole < rows:
+        raise InputError(f"{sums.name}: row {whole} is damaged, its sum is wrong")
+    return whole
 
 
 def _group(file: Any, path: str) -> Any:

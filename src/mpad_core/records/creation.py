@@ -16,20 +16,22 @@ from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.records.directory import sync_directory, temporary
 from mpad_core.records.header import TrajectoryHeader
 from mpad_core.records.layout import (
-    EVENTS_CHUNK,
+    EVENT_SUMS_PATH,
     EVENTS_PATH,
     EVENTS_UNIT,
     FORMAT,
     NANOMETRES,
     OBSERVERS_PATH,
     POSITION_PATH,
+    ROW_SUMS_PATH,
     Column,
     columns,
-    no_event,
 )
 from mpad_core.records.room import is_no_room, let_go
+from mpad_core.records.sums import header_sum
 
 CHUNK_BYTES = 2**14  # small, since a flush writes whole chunks
+MOST_ROWS = 1024  # of a chunk
 CREATOR = "mpad"
 _PARTICLES = "/particles/trajectory"
 
@@ -49,9 +51,11 @@ def create_file(
         _write_particles(file, header)
         _write_mpad(file, header)
         for column in growing:
-            _make(file, column, chunk_bytes)
+            _make_column(file, column, chunk_bytes)
+        _make(file, ROW_SUMS_PATH, (), "u4", MOST_ROWS)
         _name_again(file)
         _number_fields(file, fields)
+        file["mpad"].attrs["sum"] = header_sum(header, fields)
         if "bonds" in header.quantities:
             _make_events(file)
     return file
@@ -141,16 +145,13 @@ def _write_texts(file: Any, path: str, texts: str | Iterable[str]) -> None:
     file[path] = bare.astype(h5py.string_dtype("utf-8", length))
 
 
-def _make(file: Any, column: Column, chunk_bytes: int) -> None:
-    rows = min(max(chunk_bytes // column.row_bytes, 1), EVENTS_CHUNK)
-    dataset = file.create_dataset(
-        column.path,
-        shape=(0, *column.shape),
-        maxshape=(None, *column.shape),
-        chunks=(rows, *column.shape),
-        dtype=column.dtype,
-        fillvalue=column.fill,
-    )
+def _make(file: Any, path: str, shape: tuple[int, ...], dtype: Any, rows: int) -> Any:
+    return file.create_dataset(path, shape=(0, *shape), maxshape=(None, *shape), chunks=(rows, *shape), dtype=dtype)
+
+
+def _make_column(file: Any, column: Column, chunk_bytes: int) -> None:
+    rows = min(max(chunk_bytes // column.row_bytes, 1), MOST_ROWS)
+    dataset = _make(file, column.path, column.shape, column.dtype, rows)
     if column.unit:
         dataset.attrs["unit"] = column.unit
 
@@ -167,8 +168,7 @@ def _number_fields(file: Any, fields: Sequence[FieldDeclaration]) -> None:
 
 
 def _make_events(file: Any) -> None:
-    table = file.create_dataset(
-        EVENTS_PATH, shape=(0,), maxshape=(None,), chunks=(EVENTS_CHUNK,), dtype=BOND_EVENT, fillvalue=no_event()
-    )
+    table = _make(file, EVENTS_PATH, (), BOND_EVENT, MOST_ROWS)
     table.attrs["unit"] = EVENTS_UNIT
     table.attrs["kinds"] = np.array(["formed", "broken"], dtype=h5py.string_dtype())
+    _make(file, EVENT_SUMS_PATH, (), "u4", MOST_ROWS)

@@ -14,13 +14,12 @@ from typing import Any
 import h5py
 
 from mpad_core.interfaces.errors import InputError
+from mpad_core.records.unended import UnendedFile, is_unended
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}  # as h5repack may add
 _DEFLATE_RATIO = 1032  # the most that deflate can shrink
 _SLACK = 2**20  # bytes that a dataset may claim beyond what is stored: rows that a killed writer had announced
 _MOST_OBJECTS = 10_000
-_FLAGS = 11  # where a superblock of version 3 keeps them; HDF5 checks its sum
-_SWMR_WRITING = 4  # a SWMR writer is at work, or was killed
 _DAMAGE = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError, AttributeError)
 
 
@@ -31,7 +30,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
     Parameters
     ----------
     path
-        of the file; it is opened for reading only, and as a SWMR reader where a writer has not ended it
+        of the file; it is opened for reading only, and through `UnendedFile` where a writer has not ended it
 
     Yields
     ------
@@ -43,12 +42,10 @@ def opened(path: str | os.PathLike[str]) -> Iterator[Any]:
         one line, when the file is absent, damaged, or holds what mpad does not write
     """
     with _one_line(Path(path)):
-        file = _open(Path(path))
-        try:
+        _check_kind(Path(path))
+        with _view(Path(path)) as view, h5py.File(view, "r") as file:
             _inspect(file)
             yield file
-        finally:
-            file.close()
 
 
 @contextmanager
@@ -64,7 +61,24 @@ def _one_line(path: Path) -> Iterator[None]:
         raise InputError(f"{path}: cannot be read as a trajectory ({type(error).__name__}: {reason})") from error
 
 
-def _open(path: Path) -> Any:
+def is_finished(file: Any) -> bool:
+    """Tell whether an opened file was ended by its writer, rather than cut off or still being written."""
+    return bool(file.driver != "fileobj")
+
+
+@contextmanager
+def _view(path: Path) -> Iterator[Any]:
+    if not is_unended(path):
+        yield path
+        return
+    view = UnendedFile(path)
+    try:
+        yield view
+    finally:
+        view.close()
+
+
+def _check_kind(path: Path) -> None:
     try:
         found = path.stat()
     except FileNotFoundError as error:
@@ -73,18 +87,6 @@ def _open(path: Path) -> Any:
         raise InputError("not a regular file")
     if not h5py.is_hdf5(path):
         raise InputError("not an HDF5 file, or its beginning is lost")
-    try:
-        return h5py.File(path, "r")
-    except OSError:
-        if not _being_written(path):
-            raise
-    return h5py.File(path, "r", swmr=True)  # which would let in every file, and read zeros where one was cut short
-
-
-def _being_written(path: Path) -> bool:
-    with path.open("rb") as stream:
-        head = stream.read(_FLAGS + 1)
-    return bool(head[_FLAGS] & _SWMR_WRITING)
 
 
 def _inspect(file: Any) -> None:

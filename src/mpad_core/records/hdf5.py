@@ -14,7 +14,15 @@ from mpad_core.interfaces.observer import FieldDeclaration, Frame
 from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.records.creation import CHUNK_BYTES, create_file, extend, settle
 from mpad_core.records.header import TrajectoryHeader
-from mpad_core.records.layout import BOND_EVENTS, EVENTS_PATH, FRAMES, columns, frame_rows
+from mpad_core.records.layout import (
+    BOND_EVENTS,
+    EVENT_SUMS_PATH,
+    EVENTS_PATH,
+    FRAMES,
+    ROW_SUMS_PATH,
+    columns,
+    frame_rows,
+)
 from mpad_core.records.room import (
     RESERVE,
     BrokenTrajectoryError,
@@ -25,6 +33,7 @@ from mpad_core.records.room import (
     need_room,
 )
 from mpad_core.records.salvage import salvage
+from mpad_core.records.sums import row_sums
 
 _FLOOR = 2**16  # bytes: below the pending rows plus this, a flush is not even tried
 
@@ -54,7 +63,8 @@ class TrajectoryWriter:
         self._open = True
         self._columns = columns(header, fields)
         self._datasets = [file[column.path] for column in self._columns]
-        self._table = file[EVENTS_PATH] if "bonds" in header.quantities else None
+        self._sums = file[ROW_SUMS_PATH]
+        self._table, self._table_sums = map(file.get, (EVENTS_PATH, EVENT_SUMS_PATH))
         self._frames: list[tuple[NDArray[np.generic], ...]] = []
         self._events: list[NDArray[np.void]] = []
         self._rows = {FRAMES: self._datasets[0].shape[0], BOND_EVENTS: 0 if self._table is None else len(self._table)}
@@ -231,10 +241,16 @@ class TrajectoryWriter:
         self._count_pending()
 
     def _write_pending(self) -> None:
-        for index, dataset in enumerate(self._datasets if self._frames else ()):
-            extend(dataset, np.stack([rows[index] for rows in self._frames]))
+        if self._frames:
+            blocks = [np.stack(rows) for rows in zip(*self._frames, strict=True)]
+            for dataset, block in zip(self._datasets, blocks, strict=True):
+                extend(dataset, block)
+            pairs = zip(self._columns, blocks, strict=True)
+            extend(self._sums, row_sums([block for column, block in pairs if column.is_summed]))
         if self._events:
-            extend(self._table, np.concatenate(self._events))
+            events = np.concatenate(self._events)
+            extend(self._table, events)
+            extend(self._table_sums, row_sums([events]))
 
     def _count_pending(self) -> None:
         self._rows[FRAMES] += len(self._frames)

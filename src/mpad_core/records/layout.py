@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 
 from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.interfaces.observer import FieldDeclaration, Frame
-from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.records.header import TrajectoryHeader
 
 FORMAT = 1  # of the /mpad group; a reader refuses a higher one
 FRAMES = "frames"
 BOND_EVENTS = "bond_events"
 EVENTS_PATH = "/mpad/bond_events"
+ROW_SUMS_PATH = "/mpad/row_sums"
+EVENT_SUMS_PATH = "/mpad/bond_event_sums"
 EVENTS_UNIT = "s 1 1 1 1 1 1 um um um pN"  # one a column of BOND_EVENT
-EVENTS_CHUNK = 1024  # rows
 OBSERVERS_PATH = "/mpad/observers"
 POSITION_PATH = "/particles/trajectory/position"
 NANOMETRES = 1e3  # in a µm
@@ -48,10 +48,9 @@ class Column:
         return int(np.dtype(self.dtype).itemsize * np.prod(self.shape, dtype=np.int64))
 
     @property
-    def fill(self) -> object:
-        """What stands where nothing was written: seen by a reader, it gives away a row that never came."""
-        kind = np.dtype(self.dtype).kind
-        return {"f": np.nan, "i": -1}.get(kind, 0)
+    def is_summed(self) -> bool:
+        """Tell whether the row's sum covers it; what only says another column in other units needs none."""
+        return self.scale == 1.0
 
     def row(self, value: object) -> NDArray[np.generic]:
         """Copy a value into the form in which it is stored.
@@ -164,10 +163,3 @@ def frame_rows(
         raise PartError(f"frame at step {frame.step}: holds {len(frame.cells)} cells, the trajectory {cells}")
     taken = [column.row(getattr(frame, column.attribute)) for column in own]
     return (*taken, *(column.row(value) for column, value in zip(made[len(own) :], values, strict=True)))
-
-
-def no_event() -> NDArray[np.void]:
-    """Give the row that stands where no bond event was written."""
-    row = np.zeros((), dtype=BOND_EVENT)
-    row["time"] = np.nan
-    return row

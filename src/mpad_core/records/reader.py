@@ -59,7 +59,7 @@ def _frames(found: Contents) -> dict[str, Any]:
 
 def _kept(found: Contents) -> list[tuple[Column, Any]]:
     """Leave out the positions in nm: those in µm say it exactly."""
-    return [pair for pair in zip(found.columns, found.datasets, strict=True) if pair[0].scale == 1.0]
+    return [pair for pair in zip(found.columns, found.datasets, strict=True) if pair[0].is_summed]
 
 
 def _rows(found: Contents, dataset: Any) -> NDArray[Any]:

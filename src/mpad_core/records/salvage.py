@@ -13,10 +13,9 @@ from mpad_core.records.contents import Contents, contents
 from mpad_core.records.creation import CHUNK_BYTES, create_file, extend, settle, unless_it_fails
 from mpad_core.records.guard import opened
 from mpad_core.records.header import TrajectoryHeader
-from mpad_core.records.layout import BOND_EVENTS, EVENTS_PATH, FRAMES
+from mpad_core.records.layout import BOND_EVENTS, EVENT_SUMS_PATH, EVENTS_PATH, FRAMES, ROW_SUMS_PATH
 from mpad_core.records.room import RESERVE, need_room
-
-_BLOCK_BYTES = 2**22  # copied at a time
+from mpad_core.records.sums import blocks
 
 
 def salvage(
@@ -56,7 +55,7 @@ def salvage(
         need_room(path.parent, reserve + path.stat().st_size)
         copy = create_file(path, found.header, found.fields, chunk_bytes=chunk_bytes)
         with unless_it_fails(copy, path):
-            _copy(found, copy, kept)
+            _copy(source, copy, found, kept)
         settle(copy, path)
     return copy, found.header, found.fields
 
@@ -93,14 +92,13 @@ def _kept(rows: Mapping[str, int], found: Contents) -> dict[str, int]:
     return kept
 
 
-def _copy(found: Contents, copy: Any, kept: Mapping[str, int]) -> None:
-    for column, dataset in zip(found.columns, found.datasets, strict=True):
-        _copy_rows(dataset, copy[column.path], kept[FRAMES])
-    if found.events is not None:
-        _copy_rows(found.events, copy[EVENTS_PATH], kept[BOND_EVENTS])
+def _copy(source: Any, copy: Any, found: Contents, kept: Mapping[str, int]) -> None:
+    for path in (*(column.path for column in found.columns), ROW_SUMS_PATH):
+        _copy_rows(source[path], copy[path], kept[FRAMES])
+    for path in (EVENTS_PATH, EVENT_SUMS_PATH) if found.events is not None else ():
+        _copy_rows(source[path], copy[path], kept[BOND_EVENTS])
 
 
 def _copy_rows(source: Any, target: Any, rows: int) -> None:
-    step = max(_BLOCK_BYTES // max(int(np.prod(source.shape[1:])) * source.dtype.itemsize, 1), 1)
-    for start in range(0, rows, step):
-        extend(target, source[start : min(start + step, rows)])
+    for start, stop in blocks(rows, int(np.prod(source.shape[1:])) * source.dtype.itemsize):
+        extend(target, source[start:stop])

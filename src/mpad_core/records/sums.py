@@ -24,7 +24,7 @@ def row_sums(blocks: Sequence[NDArray[Any]]) -> NDArray[np.uint32]:
     rows = len(blocks[0])
     parts = [np.ascontiguousarray(block).view(np.uint8).reshape(rows, -1) if rows else block for block in blocks]
     matrix = np.hstack(parts) if rows else np.empty((0, 0), dtype=np.uint8)
-    return np.array([zlib.crc32(row) for row in matrix], dtype=np.uint32)
+    return np.array([zlib.crc32(row.data) for row in matrix], dtype=np.uint32)
 
 
 def whole_rows(datasets: Sequence[Any], sums: Any, rows: int) -> int:
