@@ -68,14 +68,21 @@ def run(scene: Path, output: Path | None, resume: bool, checkpoint_every: float,
 
 @mpad.command()
 @_SCENE
+@click.option("--measure", is_flag=True, help="Also take a few steps and print what one costs.")
 @_SET
-def check(scene: Path, overrides: tuple[str, ...]) -> None:
+def check(scene: Path, measure: bool, overrides: tuple[str, ...]) -> None:
     """Check a scene; print each part, and each effect on or off and why."""
     from mpad_core.scene.files import load_scene
     from mpad_core.scene.plan import plan_lines
 
-    for line in plan_lines(load_scene(scene, overrides)):
+    loaded = load_scene(scene, overrides)
+    for line in plan_lines(loaded):
         click.echo(line)
+    if measure:
+        from mpad_core.studies.measuring import cost_lines
+
+        for line in cost_lines(loaded):
+            click.echo(line)
 
 
 @mpad.command()

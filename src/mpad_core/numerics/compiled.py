@@ -57,7 +57,8 @@ def _cache_directory() -> Path:
     return wanted
 
 
-numba.config.CACHE_DIR = str(_cache_directory())  # not the environment, which child processes would inherit
+# not through the environment, which child processes would inherit
+numba.config.CACHE_DIR = str(_cache_directory())  # type: ignore[attr-defined]  # set by numba at run time
 
 
 def _forgiving(dispatcher: Any) -> Any:

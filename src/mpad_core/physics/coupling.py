@@ -14,7 +14,7 @@ from attrs import frozen
 from scipy.linalg import cho_factor, cho_solve
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.errors import PartError, RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion, Setting
 from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
@@ -23,6 +23,7 @@ from mpad_core.physics.questions import constrained_motion, unit_load
 
 LARGEST_GROUP = 8  # cells: a burst's cost grows with the cube
 NOT_FELT = 1e12  # radii: the wall functions are those of an unbounded fluid to the last bit at this gap
+_ASYMMETRY = 0.1  # of sqrt(M_ii M_jj): coarse boundary elements reach 0.03 (near contact), and are symmetrised
 _REACHES = (np.inf, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group
 
 
@@ -39,6 +40,11 @@ class Coupling:
 
 class Coupler(Protocol):
     """Gives the coupling at a configuration."""
+
+    @property
+    def plan(self) -> Any:
+        """The solver's plan, or None."""
+        ...
 
     def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
         """Give the coupling there; `mean_loads` (N, 6) are those under which distant cells are felt."""
@@ -69,6 +75,9 @@ def free_motion(
     motion = solver.solve(solver.prepare(plan, configuration), loads.reshape(n, 6, 6 * n + 1))
     answer = motion.velocity.reshape(6 * n, 6 * n + 1)
     mobility = (answer[:, :-1] - answer[:, -1:]) / size
+    size_of = np.sqrt(np.abs(np.diag(mobility)))
+    if (np.abs(mobility - mobility.T) > _ASYMMETRY * np.outer(size_of, size_of)).any():
+        raise PartError(f"solver {solver.name!r} gave a mobility that is not symmetric, as reciprocity demands")
     return 0.5 * (mobility + mobility.T), answer[:, -1].copy(), motion
 
 
@@ -77,6 +86,7 @@ class NoCoupling:
     """The null object: every cell alone, which the wall functions treat exactly."""
 
     problem: Problem
+    plan: Any = None
 
     def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
         """Give zero, every free cell its own group."""
@@ -182,12 +192,12 @@ class SolverCoupling:
         return motion.guess
 
 
-def coupler(problem: Problem) -> Coupler:
-    """Give the coupler of a problem; the solver's plan is made here, once a run."""
+def coupler(problem: Problem, plan: Any = None) -> Coupler:
+    """Give the coupler of a problem; the solver's plan is made here, once a run, unless there is one already."""
     if not problem.coupled:
         return NoCoupling(problem=problem)
     touching = 2 * float(problem.roughness.max()) + (problem.contact.gaps()[1] if problem.contact else 0.0)
-    plan = problem.solver.plan(problem.setting)
+    plan = problem.solver.plan(problem.setting) if plan is None else plan
     return SolverCoupling(problem=problem, plan=plan, speed=typical_speed(problem), touching=1.2 * touching)
 
 

@@ -91,10 +91,12 @@ def settle(file: Any, path: Path) -> None:
 
 
 def extend(dataset: Any, block: NDArray[Any]) -> None:
-    """Add rows at a dataset's end."""
-    start = dataset.shape[0]
-    dataset.resize(start + len(block), axis=0)
-    dataset[start:] = block
+    """Add rows at a dataset's end; by h5py's lower calls, since its upper ones take three times as long."""
+    start, *rest = dataset.id.shape
+    dataset.id.set_extent((start + len(block), *rest))
+    space = dataset.id.get_space()
+    space.select_hyperslab((start, *(0 for _ in rest)), block.shape)
+    dataset.id.write(h5py.h5s.create_simple(block.shape), space, np.ascontiguousarray(block))
 
 
 def _write_h5md(file: Any, header: TrajectoryHeader) -> None:

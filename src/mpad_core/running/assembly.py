@@ -147,7 +147,12 @@ def bond_list(bonds: Bonds) -> BondList:
 
 def motion_of(state: State) -> Motion:
     """Copy what a burst changes."""
+    cells = len(state.wall_gaps)
     return Motion(
-        state.centres.copy(), state.wall_gaps.copy(), state.orientations.copy(), state.velocities.copy(),
-        np.zeros_like(state.velocities),
-    )  # fmt: skip
+        centre=state.centres.copy(),
+        gap=state.wall_gaps.copy(),
+        orientation=state.orientations.copy(),
+        velocity=state.velocities.copy(),
+        turn=np.zeros((cells, 3)),
+        impulse=np.zeros((cells, 6)),
+    )

@@ -6,18 +6,18 @@ import numpy as np
 from attrs import evolve
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.values import Configuration
-from mpad_core.physics.coupling import coupler, lone_cell
+from mpad_core.physics.coupling import lone_cell
 from mpad_core.physics.molecules import site_counts
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, no_bonds
-from mpad_core.running.march import make_ready, march
+from mpad_core.running.march import Machine, configuration_of, make_ready, march
 
 Listener = Callable[[str, State], None]
 
 
-def at_rest(problem: Problem) -> State:
+def at_rest(machine: Machine) -> State:
     """Give the cells at their places, without bonds, moving as flow and weight alone would have them."""
+    problem = machine.problem
     cells = len(problem.names)
     state = State(
         step=0,
@@ -34,13 +34,13 @@ def at_rest(problem: Problem) -> State:
         bound_at=problem.start[:, 0].copy(),
         caught_since=np.full(cells, np.inf),
     )
-    return evolve(state, drift=_first_velocities(problem, state))
+    return evolve(state, drift=_first_velocities(machine, state))
 
 
-def _first_velocities(problem: Problem, state: State) -> Array:
+def _first_velocities(machine: Machine, state: State) -> Array:
     """Give the velocities (N, 6) under weight and flow: where the first outer step predicts its middle from."""
-    configuration = Configuration(centres=state.centres, radii=problem.radii, wall_gaps=state.wall_gaps)
-    coupling = coupler(problem).at(configuration, state.mean_loads, None)
+    problem = machine.problem
+    coupling = machine.coupler.at(configuration_of(problem, state), state.mean_loads, None)
     velocity = np.zeros((len(problem.names), 6))
     for group, matrix in zip(coupling.groups, coupling.matrices, strict=True):
         resistance = matrix.copy()
@@ -56,18 +56,17 @@ def _first_velocities(problem: Problem, state: State) -> Array:
     return velocity
 
 
-def initial_state(problem: Problem, listener: Listener = lambda name, state: None) -> State:
+def initial_state(machine: Machine, listener: Listener = lambda name, state: None) -> State:
     """Give the state at time zero.
 
     Cells that first roll alone do so one after the other, each without all others; then each is moved back along the
     wall, its bonds with it, to the place that the scene gives. `listener` hears every state of these preparations.
     """
-    state = at_rest(problem)
-    last = 0
+    problem, state, last = machine.problem, at_rest(machine), 0
     for cell in np.flatnonzero(problem.alone_for > 0):
-        alone = problem.only([cell])
+        alone = make_ready(problem.only([cell]), machine.coupler.plan)
         rolled = at_rest(alone)
-        for rolled_on in march(make_ready(alone), rolled, float(problem.alone_for[cell])):
+        for rolled_on in march(alone, rolled, float(problem.alone_for[cell])):
             rolled = rolled_on
             listener(problem.names[cell], rolled)
         state = _placed(problem, state, rolled, int(cell))

@@ -99,6 +99,7 @@ class Motion(NamedTuple):
     gap: Array  # (N,) µm, smooth sphere to wall
     orientation: Array  # (N, 4)
     velocity: Array  # (N, 6)
+    turn: Array  # (N, 3) angular velocity, integrated over time
     impulse: Array  # (N, 6) loads other than the fluid's, integrated over time
 
 

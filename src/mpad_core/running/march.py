@@ -48,10 +48,13 @@ class Machine:
         return lengths, np.array(tensions)
 
 
-def make_ready(problem: Problem) -> Machine:
-    """Tabulate laws, place molecules, choose steps and let the solver make its plan."""
+def make_ready(problem: Problem, plan: Any = None) -> Machine:
+    """Tabulate laws, place molecules, choose steps and let the solver make its plan.
+
+    `plan` is one that the solver has made already, for this problem or for another in the same fluid.
+    """
     fixed = assembly.assemble(problem)
-    return Machine(problem=problem, fixed=fixed, pace=pace.choose_pace(problem, fixed), coupler=coupler(problem))
+    return Machine(problem=problem, fixed=fixed, pace=pace.choose_pace(problem, fixed), coupler=coupler(problem, plan))
 
 
 def configuration_of(problem: Problem, state: State) -> Configuration:
@@ -156,7 +159,7 @@ def _next(
         wall_gaps=motion.gap,
         orientations=motion.orientation,
         velocities=motion.velocity,
-        drift=np.concatenate([moved / lasted, motion.velocity[:, 3:]], axis=1),
+        drift=np.concatenate([moved, motion.turn], axis=1) / lasted,
         mean_loads=motion.impulse / lasted,
         bonds=bonds,
         guess=coupling.guess,

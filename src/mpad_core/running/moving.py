@@ -297,6 +297,7 @@ def advance(group: int, dt: float, system: System, bonds: Bonds, attached: Attac
         motion.centre[cell] += dt * own[:3]
         motion.gap[cell] += dt * own[2]
         turned(motion.orientation[cell], dt * own[3], dt * own[4], dt * own[5], motion.orientation[cell])
+        motion.turn[cell] += dt * own[3:]
         motion.impulse[cell] += dt * load[6 * place : 6 * place + 6]
     return DONE
 

@@ -34,7 +34,8 @@ def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
     bounds = [_LARGEST_SUB_STEP]
     rates = fixed.species.tables.coefficients[:, 2, 0]
     if rates.size and rates.max() > 0:
-        bounds.append(2 * tolerances.rate / float(rates.max()))
+        densest = max(s.surface.densest() / s.at_density if s.reach != "pairs" else 1.0 for s in problem.species)
+        bounds.append(2 * tolerances.rate / (float(rates.max()) * max(densest, 1e-12)))
     settling = np.abs(problem.external[:, :3]).max() / (6 * np.pi * problem.setting.viscosity * problem.radii.min())
     vertical = _VERTICAL * abs(problem.setting.shear_rate) * float(problem.radii.max()) + float(settling)
     if vertical > 0:

@@ -62,6 +62,12 @@ class Recorder:
         """Append one frame with what the observers see in it."""
         self.writer.append(frame, [value for observer in self.recording.observers for value in observer.see(frame)])
 
+    def finish(self, state: State) -> None:
+        """Record the last state, unless it has just been recorded."""
+        if state.time > self.schedule.last_time:
+            self.record(frame_of(self.problem, self.hazards, state, state, 1.0))
+            self.writer.flush()
+
     def keep(self, state: State, ended: str = "") -> None:
         """Write the checkpoint; `ended` says why the run is over, once it is."""
         arrays = to_arrays(state) | self.schedule.memory() | {"ended": np.array(ended)}

@@ -123,7 +123,7 @@ def _begin(
         raise InputError(f"{directory}: holds a run already; add --resume to go on with it, or choose another with -o")
     if not checkpoint.exists():
         log.write("preparing", run=directory.name, cells=order.problem.names)
-        state = _prepared(order.problem, signals)
+        state = _prepared(machine, signals)
         return begin_recording(order.recording, machine, directory, state), state, ""
     kept = read_checkpoint(checkpoint)
     state = from_arrays(kept)
@@ -133,14 +133,14 @@ def _begin(
     return go_on_recording(order.recording, order.problem, directory, kept), state, str(kept["ended"])
 
 
-def _prepared(problem: Problem, signals: Signals) -> State:
+def _prepared(machine: Machine, signals: Signals) -> State:
     """Give the state at time zero; cells that first roll alone do so here."""
 
     def hear(name: str, state: State) -> None:
         if signals.received:
             raise InterruptedRunError(f"interrupted while {name!r} first rolled alone; start anew", signals.received)
 
-    return initial_state(problem, hear)
+    return initial_state(machine, hear)
 
 
 def _go_on(
@@ -171,5 +171,6 @@ def _go_on(
         if time.monotonic() - kept_at > order.checkpoint_every:
             recorder.keep(after)
             kept_at = time.monotonic()
+    recorder.finish(before)
     recorder.keep(before, ended or "time")
     return before, ended or "time", steps

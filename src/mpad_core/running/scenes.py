@@ -22,4 +22,5 @@ def states(scene: Scene, *, replicate: int = 0) -> Iterator[State]:
         Added to the scene's seed.
     """
     problem = compose(scene, replicate)
-    yield from march(make_ready(problem), initial_state(problem), scene.stop.time)
+    machine = make_ready(problem)
+    yield from march(machine, initial_state(machine), scene.stop.time)
