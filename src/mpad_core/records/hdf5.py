@@ -35,15 +35,16 @@ from mpad_core.records.room import (
 from mpad_core.records.salvage import salvage
 from mpad_core.records.sums import row_sums
 
-_FLOOR = 2**16  # bytes: below the pending rows plus this, a flush is not even tried
+_FLOOR = 2**19  # bytes for a new chunk in every dataset: without them beside the rows a flush is not even tried
 
 
 class TrajectoryWriter:
     """Writes a trajectory; made by `create` or `resume`.
 
     Rows given to `append` and `append_events` wait in memory until `flush`; what has been flushed survives the death
-    of the process. After a `DiskFullError` no flush will succeed; after a `BrokenTrajectoryError` the file has
-    already been let go of and stays as the last good flush left it.
+    of the process. After a `NearlyFullError` everything is safe and the file still open; after a
+    `BrokenTrajectoryError` it has already been let go of and stays as the last good flush left it, and `close` and
+    `abandon` do nothing more.
     """
 
     def __init__(
@@ -129,7 +130,7 @@ class TrajectoryWriter:
         path
             the trajectory
         rows
-            what `rows()` gave when the checkpoint was written
+            what `rows()` gave when the checkpoint was written; empty for a run that died before its first one
         chunk_bytes, reserve
             as in `create`
 

@@ -61,9 +61,12 @@ class Column:
             when its shape is not the declared one, or it cannot be stored as the declared type
         """
         try:
-            given = np.array(value, dtype=self.dtype)
+            with np.errstate(invalid="ignore"):
+                given = np.array(value, dtype=self.dtype)
         except (TypeError, ValueError, OverflowError) as error:
             raise PartError(f"recorded field {self.name}: cannot be stored as {self.dtype}: {error}") from error
+        if given.dtype.kind != "f" and not np.array_equal(given, np.asarray(value)):
+            raise PartError(f"recorded field {self.name}: declared as {self.dtype}, given {value!r}")
         if given.shape != self.shape:
             raise PartError(f"recorded field {self.name}: declared with shape {self.shape}, given {given.shape}")
         return given if self.scale == 1.0 else given * self.scale

@@ -1,0 +1,58 @@
+"""Parts made with typical numbers, so that every installed part can be tried without being known."""
+
+from typing import Any
+
+import attrs
+import numpy as np
+from attrs import frozen
+
+from mpad_core.arrays import Array
+
+THERMAL_ENERGY = 4.11e-3  # pN µm, at 298 K
+REST_LENGTH = 0.03  # µm, of a selectin bond (King & Hammer, PNAS 2001)
+
+_BY_NAME: dict[str, Any] = {
+    "rest_length": REST_LENGTH, "kT": THERMAL_ENERGY, "stiffness": 1e4, "transition_stiffness": 9e3,
+    "strength": 500.0, "decay": 565.0, "density": 180.0,
+}  # fmt: skip
+_BY_UNIT: dict[str, Any] = {
+    "1/s": 2.0, "um": 4e-5, "1/um": 100.0, "1/um^2": 100.0, "pN": 10.0, "pN/um": 1e4, "pN um": THERMAL_ENERGY, "s": 0.1,
+}  # fmt: skip
+
+
+@frozen(kw_only=True)
+class Everywhere:
+    """A surface with one site density: what contracts use where any surface will do."""
+
+    name = "everywhere"
+    sites: float = 180.0  # 1/µm²
+
+    def density(self, x: Array, y: Array) -> Array:
+        """Give the density (1/µm²)."""
+        return np.full(np.broadcast_shapes(np.shape(x), np.shape(y)), self.sites)
+
+    def densest(self) -> float:
+        """Give the density (1/µm²)."""
+        return self.sites
+
+
+def typical(made: Any, **given: Any) -> Any:
+    """Make a part with its defaults, and with typical numbers for parameters that have none.
+
+    Parameters
+    ----------
+    made
+        The part's attrs class.
+    given
+        Parameters that are to have other values.
+
+    Returns
+    -------
+    The part. Numbers are chosen by a parameter's name, else by its unit, else 1.
+    """
+    chosen = {
+        field.alias: _BY_NAME.get(field.alias, _BY_UNIT.get(field.metadata.get("unit", ""), 1.0))
+        for field in attrs.fields(made)
+        if field.init and field.default is attrs.NOTHING
+    }
+    return made(**(chosen | given))

@@ -1,0 +1,80 @@
+"""Hypothesis strategies: configurations of spheres, loads, lengths."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numpy as np
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+from mpad_core.arrays import Array
+from mpad_core.interfaces.values import Configuration
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_CELL = 5.0  # side of the lattice that keeps spheres of radius 2 at most apart
+_JITTER = 0.4
+
+
+def tried(number: int) -> Callable[[F], F]:
+    """Try a law on so many examples, the same ones every time; contracts are inherited, hence run by many classes."""
+    decorate: Callable[[F], F] = settings(
+        max_examples=number,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        suppress_health_check=[HealthCheck.differing_executors, HealthCheck.too_slow],
+    )
+    return decorate
+
+
+def numbers(low: float, high: float) -> st.SearchStrategy[float]:
+    """Draw finite floats from a range."""
+    return st.floats(low, high, allow_nan=False, allow_infinity=False, allow_subnormal=False)
+
+
+@st.composite
+def configurations(
+    draw: st.DrawFn, *, fewest: int = 1, most: int = 4, unequal: bool = True, smallest_gap: float = 1e-3
+) -> Configuration:
+    """Draw spheres of radius 0.5 to 2 that touch neither each other nor the wall z = 0, the lowest ones near it.
+
+    Parameters
+    ----------
+    fewest, most
+        Number of spheres.
+    unequal
+        Whether radii may differ.
+    smallest_gap
+        Smallest gap to the wall, in radii.
+    """
+    count = draw(st.integers(fewest, most))
+    side = int(np.ceil(most ** (1 / 3) - 1e-9))
+    places = draw(st.permutations(range(side**3)))[:count]
+    radii = np.array([draw(numbers(0.5, 2.0)) for _ in range(count if unequal else 1)] * (1 if unequal else count))
+    centres = np.empty((count, 3))
+    for i, place in enumerate(places):
+        cell = np.array([place % side, place // side % side, place // side**2])
+        centres[i] = _CELL * cell + [draw(numbers(-_JITTER, _JITTER)) for _ in range(3)]
+        gap = smallest_gap * (5.0 / smallest_gap) ** draw(numbers(0.0, 1.0))
+        if cell[2] == 0:
+            centres[i, 2] = radii[i] * (1 + min(gap, 0.2))
+        else:
+            centres[i, 2] += 2.5 + _JITTER
+    return Configuration(centres=centres, radii=radii)
+
+
+def crowd(count: int, unequal: bool = True) -> Configuration:
+    """Give one fixed configuration of many spheres on a jittered lattice above the wall."""
+    draws = np.random.Generator(np.random.Philox(7))
+    side = int(np.ceil(count ** (1 / 3)))
+    lattice = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), -1).reshape(-1, 3)[:count]
+    radii = draws.uniform(0.5, 2.0, count) if unequal else np.full(count, 1.3)
+    centres = _CELL * lattice + draws.uniform(-_JITTER, _JITTER, (count, 3))
+    centres[:, 2] += 2.5
+    return Configuration(centres=centres, radii=radii)
+
+
+def some_loads(shape: tuple[int, ...], seed: int = 0) -> Array:
+    """Give fixed standard normal loads."""
+    return np.random.Generator(np.random.Philox(seed)).normal(size=shape)
