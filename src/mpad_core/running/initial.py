@@ -12,6 +12,8 @@ from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, no_bonds
 from mpad_core.running.march import Machine, configuration_of, make_ready, march
 
+ZERO = 1 << 40  # the sub-step of time zero: the same with and without preparations, and so are the draws after it
+
 Listener = Callable[[str, State], None]
 
 
@@ -62,7 +64,7 @@ def initial_state(machine: Machine, listener: Listener = lambda name, state: Non
     Cells that first roll alone do so one after the other, each without all others; then each is moved back along the
     wall, its bonds with it, to the place that the scene gives. `listener` hears every state of these preparations.
     """
-    problem, state, last = machine.problem, at_rest(machine), 0
+    problem, state = machine.problem, at_rest(machine)
     for cell in np.flatnonzero(problem.alone_for > 0):
         alone = make_ready(problem.only([cell]), machine.coupler.plan)
         rolled = at_rest(alone)
@@ -70,8 +72,7 @@ def initial_state(machine: Machine, listener: Listener = lambda name, state: Non
             rolled = rolled_on
             listener(problem.names[cell], rolled)
         state = _placed(problem, state, rolled, int(cell))
-        last = max(last, rolled.step)
-    return evolve(state, step=last, zero=last)
+    return evolve(state, step=ZERO, zero=ZERO)
 
 
 def _placed(problem: Problem, state: State, rolled: State, cell: int) -> State:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from mpad_core.arrays import Array
 from mpad_core.physics.coupling import lone_cell
@@ -30,6 +30,12 @@ class Path:
     dx: Array  # µm
     overlap: Array  # µm
     caught_at: float  # s, infinite if it was not caught
+    bound_at: float  # s, when the bonds began that hold it at the end; infinite if none do
+
+    @property
+    def binds(self) -> bool:
+        """Whether the cell can form bonds; otherwise it is a probe."""
+        return bool(self.problem.site_densities[self.cell].any())
 
     @property
     def x(self) -> Array:
@@ -57,6 +63,25 @@ class Path:
         return force > _ON_CONTACT * abs(problem.external[i, 2])
 
 
+def free_part(path: Path, trajectory: Trajectory) -> Path:
+    """Give the path up to the cell's first bond: what flow, weight and contact alone did to it."""
+    events = trajectory.bond_events[trajectory.bond_events["cell"] == path.cell]
+    first = events["time"][0] if len(events) else np.inf
+    frames = max(int(np.searchsorted(path.times, first, side="right")), 1)
+    cut = {name: getattr(path, name)[:frames] for name in ("times", "centres", "dx", "overlap")}
+    return evolve(path, **cut)
+
+
+def bound_since(trajectory: Trajectory, cell: int) -> float:
+    """Give the time (s) since when a cell has had a bond without a break, at the end; infinite if it has none."""
+    events = trajectory.bond_events[trajectory.bond_events["cell"] == cell]
+    living = np.cumsum(np.where(events["kind"] == 0, 1, -1))
+    if len(living) == 0 or living[-1] == 0:
+        return float("inf")
+    breaks = np.flatnonzero(living == 0)
+    return float(events["time"][breaks[-1] + 1 if len(breaks) else 0])
+
+
 def path_of(problem: Problem, trajectory: Trajectory, cell: str, caught_at: float = np.inf) -> Path:
     """Take one cell's path out of a trajectory; Δx is from its partner, or from the place that stands for it."""
     i = problem.names.index(cell)
@@ -71,12 +96,16 @@ def path_of(problem: Problem, trajectory: Trajectory, cell: str, caught_at: floa
         dx=x - origin,
         overlap=trajectory.positions[:, i, 2] - problem.zero_overlap[i],
         caught_at=caught_at,
+        bound_at=bound_since(trajectory, i),
     )
 
 
 def contribution(path: Path, alone: Path) -> Array:
-    """Give δ less that of the same cell alone at the same place along the wall (µm); NaN where that never was."""
-    return np.interp(path.x, alone.x, alone.overlap, left=np.nan, right=np.nan) - path.overlap
+    """Give δ less that of the same cell alone at the same place along the wall (µm); NaN where that never was.
+
+    Both are free parts of paths, along which x only grows.
+    """
+    return path.overlap - np.interp(path.x, alone.x, alone.overlap, left=np.nan, right=np.nan)
 
 
 def least_overlap(path: Path, alone: Path | None, downstream: bool) -> dict[str, Any] | None:
@@ -92,7 +121,7 @@ def least_overlap(path: Path, alone: Path | None, downstream: bool) -> dict[str,
         "rests_on_contact": bool(path.rests_on_contact()[at]),
     }
     if alone is not None:
-        by_other = -1e3 * contribution(path, alone)[at]
+        by_other = 1e3 * contribution(path, alone)[at]
         found |= {"alone_nm": 1e3 * path.overlap[at] - by_other, "contribution_of_the_other_nm": by_other}
     return found
 
@@ -119,17 +148,19 @@ def free_stream_ratio(problem: Problem, cell: int, z: float) -> float:
     return float(np.linalg.solve(resistance, load)[0] / (shear * z)) if shear else float("nan")
 
 
-def describe(path: Path, alone: Path | None, on_rates: Sequence[float]) -> dict[str, Any]:
-    """Describe one passage in numbers."""
-    caught = np.isfinite(path.caught_at)
+def describe(path: Path, free: Path, alone: Path | None, on_rates: Sequence[float]) -> dict[str, Any]:
+    """Describe one passage in numbers: the path, its free part, and the free part of the same cell's path alone."""
+    caught, bound = np.isfinite(path.caught_at), np.isfinite(path.bound_at)
     summary: dict[str, Any] = {
         "free_stream_U_over_gamma_z": free_stream_ratio(path.problem, path.cell, float(path.centres[0, path.cell, 2])),
-        "least_overlap_upstream": least_overlap(path, alone, downstream=False),
-        "least_overlap_downstream": least_overlap(path, alone, downstream=True),
+        "free_until_dx_um": free.dx[-1],
+        "least_overlap_upstream": least_overlap(free, alone, downstream=False),
+        "least_overlap_downstream": least_overlap(free, alone, downstream=True),
         "caught": bool(caught),
         "caught_dx_um": float(np.interp(path.caught_at, path.times, path.dx)) if caught else None,
         "caught_at_s": float(path.caught_at) if caught else None,
+        "bound_dx_um": float(np.interp(path.bound_at, path.times, path.dx)) if bound else None,
     }
-    if path.problem.species:
+    if path.problem.species and not path.binds:
         summary["capture_odds_were_it_free_to_bind"] = [capture_odds(path, rate) for rate in (None, *on_rates)]
     return summary

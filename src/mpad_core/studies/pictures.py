@@ -12,24 +12,36 @@ _INK, _GREY, _RED = "#1b4965", "#8d99ae", "#c1121f"
 
 
 def draw_passages(
-    paths: Sequence[Path], alone: Sequence[Path], on_rates: Sequence[float], title: str, file: FilePath
+    passing: tuple[Sequence[Path], Sequence[Path]],
+    alone: tuple[Sequence[Path], Sequence[Path]],
+    on_rates: Sequence[float],
+    title: str,
+    file: FilePath,
 ) -> None:
-    """Draw δ(Δx) with and without the other cell, their difference, and the capture hazard; write a PNG."""
+    """Draw δ(Δx) past the other cell and alone; for a probe also their difference and the capture hazard.
+
+    Parameters
+    ----------
+    passing, alone
+        Whole paths, and their free parts.
+    on_rates
+        Further on-rates (1/s) to draw the hazard for.
+    title, file
+        What stands above the picture, and the PNG's name.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    rows = 3 if paths[0].problem.species else 2
-    figure = Figure(figsize=(7.5, 2.9 * rows), layout="constrained")
+    path = passing[0][0]
+    lower = [] if path.binds else [_draw_contribution] * bool(alone[0]) + [_draw_hazard] * bool(path.problem.species)
+    figure = Figure(figsize=(7.5, 3.1 + 2.7 * len(lower)), layout="constrained")
     FigureCanvasAgg(figure)
-    panels = figure.subplots(rows, 1, sharex=True)
-    _draw_overlap(panels[0], paths, alone)
-    if alone:
-        _draw_contribution(panels[1], paths[0], alone[0])
-    if rows == 3:
-        _draw_hazard(panels[2], paths[0], on_rates)
-    cell = paths[0].problem.names[paths[0].cell]
+    panels = figure.subplots(1 + len(lower), 1, sharex=True, squeeze=False)[:, 0]
+    _draw_overlap(panels[0], passing[0], alone[0])
+    for panel, draw in zip(panels[1:], lower, strict=True):
+        draw(panel, passing[1][0], alone[1], on_rates)
     panels[0].set_title(title, loc="left", fontsize=11)
-    panels[-1].set_xlabel(f"Δx of {cell} (µm)")
+    panels[-1].set_xlabel(f"Δx of {path.problem.names[path.cell]} (µm)")
     figure.savefig(file, dpi=130)
 
 
@@ -43,19 +55,21 @@ def _draw_overlap(panel: Any, paths: Sequence[Path], alone: Sequence[Path]) -> N
             panel.plot(at[0], 1e3 * at[1], "o", color=_RED, ms=5)
     panel.axhline(0, color="black", lw=0.6)
     panel.set_ylabel("receptor overlap δ (nm)")
-    low = min(float(np.min(path.overlap)) for path in (*paths, *alone))
-    panel.set_ylim(1e3 * low * 1.25 - 3, max(-1e3 * low * 2, 20.0))
+    low = 1e3 * min(float(np.min(path.overlap)) for path in (*paths, *alone))
+    high = 1e3 * max(float(np.max(path.overlap)) for path in (*paths, *alone))
+    # the lift over the other cell is ten times what lies below zero: cut it, so that the rest can be read
+    panel.set_ylim(1.25 * low - 3, min(1.1 * high + 3, max(-2 * low, 20.0)))
     panel.legend(frameon=False, fontsize=9)
 
 
-def _draw_contribution(panel: Any, path: Path, alone: Path) -> None:
-    panel.plot(path.dx, -1e3 * contribution(path, alone), color=_INK, lw=1.5)
+def _draw_contribution(panel: Any, path: Path, alone: Sequence[Path], on_rates: Sequence[float]) -> None:
+    panel.plot(path.dx, 1e3 * contribution(path, alone[0]), color=_INK, lw=1.5)
     panel.axhline(0, color="black", lw=0.6)
     panel.set_yscale("symlog", linthresh=5)
     panel.set_ylabel("δ less δ alone,\nsame place (nm)")
 
 
-def _draw_hazard(panel: Any, path: Path, on_rates: Sequence[float]) -> None:
+def _draw_hazard(panel: Any, path: Path, alone: Sequence[Path], on_rates: Sequence[float]) -> None:
     base = [species.on_rate for species in path.problem.species]
     speed = np.maximum(np.abs(path.speed), 1e-12)
     shades = [str(shade) for shade in np.linspace(0.0, 0.65, 1 + len(on_rates))]

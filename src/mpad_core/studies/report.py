@@ -47,7 +47,8 @@ def _passage_lines(passage: dict[str, Any]) -> Iterator[str]:
     yield f"  caught: {passage['caught']} of {passage['of']}{control}"
     for described in passage["passages"]:
         if described["caught"]:
-            yield f"    caught at dx = {described['caught_dx_um']:.2f} um, t = {described['caught_at_s']:.4g} s"
+            where = f"bound at dx = {described['bound_dx_um']:.2f} um, caught at {described['caught_dx_um']:.2f} um"
+            yield f"    {where}, t = {described['caught_at_s']:.4g} s"
 
 
 def _least(found: dict[str, Any]) -> str:

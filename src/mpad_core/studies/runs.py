@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Iterator
 from os import PathLike
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from mpad_core.running.stopping import StopWhen
 from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
 from mpad_core.scene.writing import resolved_toml
-from mpad_core.studies.passage import describe, path_of
+from mpad_core.studies.passage import Path, describe, free_part, path_of
 
 SCENE, SUMMARY, LOG, PICTURE = "scene.toml", "summary.json", "run.jsonl", "passage.png"
 
@@ -58,7 +58,7 @@ def cases(scene: Scene) -> Iterator[Case]:
         if study and study.control:
             staying = [i for i, name in enumerate(problem.names) if name not in study.past]
             control = problem.only(staying)
-            yield Case(folder=str(Path(folder, "control")), seed=problem.seed, control=True, problem=control)
+            yield Case(folder=str(FilePath(folder, "control")), seed=problem.seed, control=True, problem=control)
 
 
 def run(
@@ -92,7 +92,7 @@ def run(
     InterruptedRunError, PartError, RefusedError, DiskFullError
         As `mpad_core.running.run.run_one`.
     """
-    root = Path(directory)
+    root = FilePath(directory)
     text = resolved_toml(scene)
     todo = list(cases(scene))
     root.mkdir(parents=True, exist_ok=True)
@@ -110,7 +110,7 @@ def run(
     return summary
 
 
-def _claim(root: Path, text: str, resume: bool) -> None:
+def _claim(root: FilePath, text: str, resume: bool) -> None:
     """Make the directory this scene's, or see that it is."""
     there = root / SCENE
     if not there.exists():
@@ -123,7 +123,7 @@ def _claim(root: Path, text: str, resume: bool) -> None:
         raise InputError(f"{there}: is of another scene or of other settings; --resume needs the very same scene")
 
 
-def _write_whole(path: Path, text: str) -> None:
+def _write_whole(path: FilePath, text: str) -> None:
     """Write a file so that it is there whole or not at all."""
     temporary = path.with_name(path.name + ".tmp")
     temporary.write_text(text)
@@ -131,7 +131,7 @@ def _write_whole(path: Path, text: str) -> None:
 
 
 def _run_case(
-    scene: Scene, text: str, case: Case, root: Path, resume: bool, checkpoint_every: float, log: RunLog
+    scene: Scene, text: str, case: Case, root: FilePath, resume: bool, checkpoint_every: float, log: RunLog
 ) -> Result:
     folder = root / case.folder
     order = _order(scene, text, case, checkpoint_every)
@@ -219,23 +219,26 @@ def _summary(scene: Scene, results: list[Result], wall: float) -> dict[str, Any]
     return plain
 
 
-def _paths(scene: Scene, results: list[Result], control: bool) -> list[Any]:
+def _paths(scene: Scene, results: list[Result], control: bool) -> tuple[list[Path], list[Path]]:
+    """Give the followed cell's paths, and their parts before the first bond."""
     assert scene.passage is not None
-    paths = []
+    paths, free = [], []
     for result in results:
         if result.case.control == control:
             problem, cell = result.case.problem, scene.passage.cell
             caught = result.outcome.state.caught_since[problem.names.index(cell)]
             paths.append(path_of(problem, result.trajectory, cell, float(caught)))
-    return paths
+            free.append(free_part(paths[-1], result.trajectory))
+    return paths, free
 
 
 def _passage(scene: Scene, results: list[Result]) -> dict[str, Any]:
     """Describe every passage beside its control, and count the captures."""
     assert scene.passage is not None
-    paths, alone = _paths(scene, results, False), _paths(scene, results, True)
-    beside = alone if alone else [None] * len(paths)
-    described = [describe(p, a, scene.passage.also_on_rates) for p, a in zip(paths, beside, strict=True)]
+    (paths, free), (alone, alone_free) = _paths(scene, results, False), _paths(scene, results, True)
+    beside = alone_free if alone else [None] * len(paths)
+    rates = scene.passage.also_on_rates
+    described = [describe(p, f, a, rates) for p, f, a in zip(paths, free, beside, strict=True)]
     return {
         "cell": scene.passage.cell,
         "past": list(scene.passage.past),
@@ -243,7 +246,7 @@ def _passage(scene: Scene, results: list[Result]) -> dict[str, Any]:
         "caught": sum(passage["caught"] for passage in described),
         "of": len(paths),
         "caught_in_control": sum(bool(np.isfinite(path.caught_at)) for path in alone) if alone else None,
-        "controls": [describe(path, None, ()) for path in alone],
+        "controls": [describe(p, f, None, ()) for p, f in zip(alone, alone_free, strict=True)],
     }
 
 
@@ -262,9 +265,10 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _draw(scene: Scene, results: list[Result], file: Path) -> None:
+def _draw(scene: Scene, results: list[Result], file: FilePath) -> None:
     from mpad_core.studies.pictures import draw_passages
 
     assert scene.passage is not None
-    paths, alone = _paths(scene, results, False), _paths(scene, results, True)
-    draw_passages(paths, alone, scene.passage.also_on_rates, scene.title, file)
+    draw_passages(
+        _paths(scene, results, False), _paths(scene, results, True), scene.passage.also_on_rates, scene.title, file
+    )

@@ -1,6 +1,6 @@
 """Parts made with typical numbers, so that every installed part can be tried without being known."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -24,7 +24,7 @@ _BY_UNIT: dict[str, Any] = {
 class Everywhere:
     """A surface with one site density: what contracts use where any surface will do."""
 
-    name = "everywhere"
+    name: ClassVar[str] = "everywhere"
     sites: float = 180.0  # 1/µm²
 
     def density(self, x: Array, y: Array) -> Array:

@@ -1,0 +1,19 @@
+"""Every installed solver keeps the contract, and so does `rpb` with bare lone spheres."""
+
+from typing import Any
+
+import pytest
+
+from mpad_core import solver
+from mpad_core.plugins.registry import installed
+from mpad_core.testing import MobilitySolverContract
+
+CASES: list[tuple[str, dict[str, str]]] = [(part.name, {}) for part in installed("solver")]
+CASES.append(("rpb", {"lone_sphere": "blake"}))
+
+
+class TestInstalledSolvers(MobilitySolverContract):
+    @pytest.fixture(autouse=True, params=CASES, ids=lambda case: "-".join((case[0], *case[1].values())))
+    def _part(self, request: Any) -> None:
+        name, parameters = request.param
+        self.solver = solver(name, **parameters)
