@@ -1,6 +1,7 @@
 """Many sub-steps between two calls of the solver: react → loads → implicit motion → move, compiled."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,33 +25,47 @@ def _reach_height(system: System) -> float:
     return system.bodies.wall_tips + reach
 
 
+class _Listing(NamedTuple):
+    """The molecules near the wall, and how long the list stands."""
+
+    sites: Indices  # (S,) room for all
+    first: Indices  # (N + 1,) each cell's first place in the list
+    slack: Array  # (N,) µm, how much nearer a cell's molecules may come before the list is too short
+    lever: Array  # (N,) µm, how far from the axis of the cell's turn the first to come would be
+    height: Array  # (N,) µm, of the centre when the list was made
+    turn: Array  # (N, 3) motion.turn at that time
+
+
 @compiled
-def _list_all(
-    system: System, motion: Motion, turns: Array, candidates: Indices, first: Indices, slack: Array, lever: Array
-) -> None:
-    """List every cell's candidates; note how much nearer its molecules may come before the list is too short."""
+def _list_near(system: System, motion: Motion, turns: Array, listing: _Listing) -> None:
+    """List every cell's molecules within reach of the wall or little more."""
     lowest = _reach_height(system) + _LISTING_MARGIN
+    cells = listing.slack.shape[0]
     at = 0
-    for cell in range(first.shape[0] - 1):
-        first[cell] = at
+    for cell in range(cells):
+        listing.first[cell] = at
         shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
         bottom = motion.centre[cell, 2] - shell
-        slack[cell] = max(_LISTING_MARGIN, bottom - lowest + _LISTING_MARGIN)
         depth = min(max(lowest - bottom, 0.0), shell)
-        lever[cell] = math.sqrt(depth * (2 * shell - depth)) + slack[cell]
+        listing.slack[cell] = max(_LISTING_MARGIN, bottom - lowest + _LISTING_MARGIN)
+        listing.lever[cell] = math.sqrt(depth * (2 * shell - depth)) + _LISTING_MARGIN
+        listing.height[cell] = motion.centre[cell, 2]
+        listing.turn[cell] = motion.turn[cell]
         if bottom < lowest:
-            at = list_candidates(cell, lowest, system.molecules, motion.centre[cell, 2], turns[cell], candidates, at)
-    first[first.shape[0] - 1] = at
+            at = list_candidates(cell, lowest, system.molecules, motion, turns[cell], listing.sites, at)
+    listing.first[cells] = at
 
 
 @compiled
-def _list_is_short(dt: float, motion: Motion, slack: Array, lever: Array) -> bool:
-    """Use up the list's slack by the last sub-step's motion; tell whether any is left."""
+def _list_is_short(motion: Motion, listing: _Listing) -> bool:
+    """Tell whether a molecule that is not listed may have come within reach."""
     short = False
-    for cell in range(slack.shape[0]):
-        v = motion.velocity[cell]
-        slack[cell] -= dt * (max(-v[2], 0.0) + math.sqrt(v[3] * v[3] + v[4] * v[4]) * lever[cell])
-        short = short or slack[cell] < 0
+    for cell in range(listing.slack.shape[0]):
+        drop = max(listing.height[cell] - motion.centre[cell, 2], 0.0)
+        turn_x = motion.turn[cell, 0] - listing.turn[cell, 0]
+        turn_y = motion.turn[cell, 1] - listing.turn[cell, 1]
+        nearer = drop + math.sqrt(turn_x * turn_x + turn_y * turn_y) * listing.lever[cell]
+        short = short or nearer > listing.slack[cell]
     return short
 
 
@@ -125,9 +140,10 @@ def burst(
     """
     cells = motion.gap.shape[0]
     turns = np.empty((cells, 3, 3))
-    candidates = np.empty(system.molecules.kind.shape[0], np.int64)
-    first = np.zeros(cells + 1, np.int64)
-    slack, lever = np.zeros(cells), np.zeros(cells)
+    listing = _Listing(
+        np.empty(system.molecules.kind.shape[0], np.int64), np.zeros(cells + 1, np.int64), np.zeros(cells),
+        np.zeros(cells), np.zeros(cells), np.zeros((cells, 3)),
+    )  # fmt: skip
     room = bonds.cell.shape[0]
     attached = Attached(np.zeros(cells + 1, np.int64), np.zeros(room, np.int64), np.empty((room, 3)))
     start = motion.centre.copy()
@@ -136,16 +152,18 @@ def burst(
     for done in range(limits.most):
         step = dice.step + done
         refresh_turns(motion, turns)
-        if done == 0 or _list_is_short(dt, motion, slack, lever):
-            _list_all(system, motion, turns, candidates, first, slack, lever)
-        open_sites = first[cells]
-        if bonds.living[0] + open_sites > room or event_count[0] + bonds.living[0] + open_sites > events.shape[0]:
+        if done == 0 or _list_is_short(motion, listing):
+            _list_near(system, motion, turns, listing)
+        listed = listing.first[cells]
+        if bonds.living[0] + listed > room or event_count[0] + bonds.living[0] + listed > events.shape[0]:
             return ROOM_NEEDED, done, -1
         unfit = _refused_group(system, motion)
         if unfit >= 0:
             return NOT_POSITIVE, done, unfit
         break_bonds(bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
-        form_bonds(candidates, first, bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
+        form_bonds(
+            listing.sites, listing.first, bonds, bound, system, motion, turns, dice, step, dt, events, event_count
+        )
         attach(bonds, system.molecules, turns, attached)
         for group in range(groups):
             outcome = _move_group(group, dt, system, bonds, attached, motion, turns)

@@ -26,12 +26,13 @@ _MOST_LIGANDS = 255  # in a square; each has a number of 8 bits
 
 @compiled
 def list_candidates(
-    cell: int, lowest: float, molecules: Molecules, centre_z: float, turn: Array, out: Indices, at: int
+    cell: int, lowest: float, molecules: Molecules, motion: Motion, turn: Array, out: Indices, at: int
 ) -> int:
     """List the molecules of a cell below height `lowest` from place `at` on; give the place after the last."""
+    height = motion.centre[cell, 2]
     for site in range(molecules.first[cell], molecules.first[cell + 1]):
         arm = molecules.arm[site]
-        if centre_z + turn[2, 0] * arm[0] + turn[2, 1] * arm[1] + turn[2, 2] * arm[2] < lowest:
+        if height + turn[2, 0] * arm[0] + turn[2, 1] * arm[1] + turn[2, 2] * arm[2] < lowest:
             out[at] = site
             at += 1
     return at

@@ -123,7 +123,7 @@ class BondModelContract:
         for x in low + (top - low) * shares:
             on, off = value(tables, 0, _ON_RATE, x), value(tables, 0, _OFF_RATE, x)
             start_on, start_off = value(tables, 0, _ON_RATE, rest), value(tables, 0, _OFF_RATE, rest)
-            if not off > 0 or not start_off > 0 or x >= top:
+            if not on > 0 or not off > 0 or not start_off > 0 or x >= top:
                 continue
             energy = self._energy(law, float(x))
             expected = np.exp(-energy / law.species.kT)

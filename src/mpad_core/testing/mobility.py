@@ -41,9 +41,12 @@ class MobilitySolverContract(InvarianceContract, SolvingContract):
         The solver; give it in the class that inherits.
     shortfall
         By how much an error claimed in a report may fall short of the true one.
+    worthless
+        A claimed error from which on an answer is not held to it: it says that it may be wrong by its own size.
     """
 
     shortfall: float = 2.0
+    worthless: float = 0.5
 
     @WALLS
     @pytest.mark.parametrize("gap", [1e-4, 1e-2, 0.3, 3.0, 100.0])
@@ -54,6 +57,8 @@ class MobilitySolverContract(InvarianceContract, SolvingContract):
         for loads in (np.zeros((1, 6)), some_loads((1, 6)), 50 * some_loads((1, 6), 1)):
             answer = self.motion(setting, at, loads)
             error = relative(answer.velocity, exact_alone(setting, at, loads), at.radii)
+            if answer.report.error >= self.worthless:
+                continue
             allowed = self.shortfall * answer.report.error + self.tolerance
             check("a lone sphere is as good as claimed", "bispherical series", allowed, error)
 

@@ -1,0 +1,110 @@
+"""The kernel cache: an edited callee is seen, a damaged file is made anew, and no home is no obstacle."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+_CALLER = """
+from mpad_core.numerics.compiled import compiled
+from probe_kernels.callee import inner
+
+@compiled
+def outer(x):
+    return 2.0 * inner(x)
+"""
+_CALLEE = """
+from mpad_core.numerics.compiled import compiled
+
+@compiled
+def inner(x):
+    return x + {term}
+"""
+_RUN = """
+import numba
+from probe_kernels.caller import outer
+print(outer(1.0), sum(outer.stats.cache_hits.values()), numba.config.CACHE_DIR)
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """Make an installed plugin of two modules; its kernels call each other."""
+    site = tmp_path / "site"
+    folder, info = site / "probe_kernels", site / "probe_kernels-1.0.dist-info"
+    folder.mkdir(parents=True)
+    info.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "caller.py").write_text(_CALLER)
+    (folder / "callee.py").write_text(_CALLEE.format(term="1.0"))
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: probe_kernels\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[mpad]\nbond.probe = probe_kernels\n")
+    return site
+
+
+def run(site: Path, code: str = _RUN, **environment: str) -> tuple[float, int, str]:
+    """Run in a process of its own; give the kernel's answer, the number of cache hits, the cache's place."""
+    kept = {name: text for name, text in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    kept |= {"PYTHONPATH": str(site), "PYTHONDONTWRITEBYTECODE": "1"} | environment
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, env=kept)
+    assert done.returncode == 0, done.stderr
+    answer, hits, place = done.stdout.split()
+    return float(answer), int(hits), place
+
+
+def test_an_edited_callee_gives_a_new_answer(package: Path, tmp_path: Path) -> None:
+    cache = str(tmp_path / "cache")
+    assert run(package, XDG_CACHE_HOME=cache)[:2] == (4.0, 0)
+    assert run(package, XDG_CACHE_HOME=cache)[:2] == (4.0, 1)
+    (package / "probe_kernels" / "callee.py").write_text(_CALLEE.format(term="2.0"))
+    assert run(package, XDG_CACHE_HOME=cache)[0] == 6.0
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [b"", b"no pickle at all"])
+def test_a_damaged_file_is_made_anew(package: Path, tmp_path: Path, suffix: str, damage: bytes) -> None:
+    cache = str(tmp_path / "cache")
+    run(package, XDG_CACHE_HOME=cache)
+    files = list(Path(cache).rglob(f"*.{suffix}"))
+    assert files
+    for file in files:
+        file.write_bytes(damage)
+    assert run(package, XDG_CACHE_HOME=cache)[:2] == (4.0, 0)
+    assert run(package, XDG_CACHE_HOME=cache)[:2] == (4.0, 1)
+
+
+def test_a_truncated_kernel_is_made_anew(package: Path, tmp_path: Path) -> None:
+    cache = str(tmp_path / "cache")
+    run(package, XDG_CACHE_HOME=cache)
+    for file in Path(cache).rglob("*.nbc"):
+        file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    assert run(package, XDG_CACHE_HOME=cache)[0] == 4.0
+
+
+def test_the_cache_is_private(package: Path, tmp_path: Path) -> None:
+    *_, place = run(package, XDG_CACHE_HOME=str(tmp_path / "cache"))
+    assert Path(place).parent == tmp_path / "cache" / "mpad"
+    assert Path(place).stat().st_mode & 0o077 == 0
+
+
+def test_a_home_that_cannot_be_written_is_no_obstacle(package: Path) -> None:
+    answer, _, place = run(package, HOME=os.devnull)
+    assert answer == 4.0
+    assert Path(place).parent == Path(tempfile.gettempdir())
+
+
+def test_no_home_at_all_is_no_obstacle(package: Path) -> None:
+    """As in a container whose user has neither HOME nor an entry among the users."""
+    homeless = "import os, pwd\nos.environ.pop('HOME', None)\n"
+    homeless += "def unknown(number):\n    raise KeyError(number)\npwd.getpwuid = unknown\n"
+    assert run(package, homeless + _RUN)[0] == 4.0
+
+
+def test_processes_without_a_home_leave_nothing_behind(package: Path, tmp_path: Path) -> None:
+    """A cache that no other process will find should not fill the temporary directory, one folder a process."""
+    (tmp_path / "tmp").mkdir()
+    run(package, HOME=os.devnull, TMPDIR=str(tmp_path / "tmp"))
+    assert list((tmp_path / "tmp").iterdir()) == []
