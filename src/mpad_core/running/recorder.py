@@ -5,6 +5,7 @@ Whatever instant the process dies at, the checkpoint names rows that exist, and 
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from mpad_core.physics.state import State, to_arrays
 from mpad_core.records.checkpoint import write_checkpoint
 from mpad_core.records.hdf5 import TrajectoryWriter
 from mpad_core.records.header import BondSpecies, TrajectoryHeader
+from mpad_core.records.room import NearlyFullError
 from mpad_core.running.frames import frame_of, frames
 from mpad_core.running.march import Machine
 from mpad_core.running.schedules import Cadence, Schedule
@@ -69,7 +71,12 @@ class Recorder:
             self.writer.flush()
 
     def keep(self, state: State, ended: str = "") -> None:
-        """Write the checkpoint; `ended` says why the run is over, once it is."""
+        """Write the checkpoint; `ended` says why the run is over, once it is.
+
+        The rows that it counts are made to survive a power cut first.
+        """
+        with suppress(NearlyFullError):  # the caller, who has heard it already, is about to stop
+            self.writer.flush(sync=True)
         arrays = to_arrays(state) | self.schedule.memory() | {"ended": np.array(ended)}
         rows = {f"rows.{name}": np.array(count) for name, count in self.writer.rows().items()}
         write_checkpoint(self.directory / CHECKPOINT, arrays | rows)

@@ -1,0 +1,105 @@
+"""SIGKILL at random times: the run goes on from its checkpoint and ends with the very same bits."""
+
+import json
+import random
+import time
+
+import pytest
+
+from mpad_core.records.checkpoint import read_checkpoint
+from mpad_core.records.reader import read_trajectory
+
+CHAINS, KILLS = 3, 7
+OFTEN = ("--checkpoint-every", "0.2")
+FEW = ['stop.time="700 ms"', "stop.when=[]", 'cells.roller.start.rolling_alone="20 ms"']
+VARIANTS = {
+    "isolated": [*FEW[1:], 'stop.time="120 ms"', 'solver="isolated"'],
+    "pairs": [*FEW[1:], 'stop.time="120 ms"', 'bonds.tether.reach="pairs"'],
+}
+
+
+def log(directory):
+    path = directory / "run.jsonl"
+    lines = path.read_text().splitlines() if path.exists() else []
+    return [json.loads(line)["event"] for line in lines]
+
+
+def marching(directory, seen):
+    """Tell whether a process that found `seen` lines in the log has come to the time loop."""
+    new = log(directory)[seen:]
+    return "resumed" in new or ("preparing" in new and (directory / "checkpoint.npz").exists())
+
+
+def frames(directory):
+    """Count the frames that the checkpoints of run and control stand for, and those that are in the files."""
+    kept = written = 0
+    for folder in (directory, directory / "control"):
+        if (folder / "checkpoint.npz").exists():
+            kept += int(read_checkpoint(folder / "checkpoint.npz")["rows.frames"])
+            written += len(read_trajectory(folder / "trajectory.h5"))
+    return kept, written
+
+
+def kill(tools, directory, arguments, wait, from_the_start):
+    """Start or go on, and kill after `wait`, counted from the time loop's beginning or from the process's own.
+
+    Give whether the run had ended by then, and whether frames had been added: the kill fell into the time loop.
+    """
+    seen = len(log(directory))
+    before, _ = frames(directory)
+    with tools.start(directory, arguments, *OFTEN, "--resume") as process:
+        while not (from_the_start or marching(directory, seen)):
+            assert process.poll() is None, process.stderr.read()
+            time.sleep(0.005)
+        time.sleep(wait)
+        ended = process.poll() is not None
+        process.kill()
+        process.communicate()
+    _, after = frames(directory)
+    return ended, not ended and marching(directory, seen) and after > before
+
+
+@pytest.fixture(scope="module")
+def whole(tools, tmp_path_factory):
+    directory = tmp_path_factory.mktemp("whole") / "run"
+    tools.finish(directory, tools.settings(*FEW))
+    return directory
+
+
+@pytest.fixture(scope="module")
+def in_the_loop():
+    return []
+
+
+@pytest.mark.parametrize("chain", range(CHAINS))
+def test_killed_again_and_again(chain, whole, in_the_loop, tools, tmp_path):
+    dice = random.Random(chain)
+    directory = tmp_path / "run"
+    arguments = tools.settings(*FEW)
+    for number in range(KILLS):
+        from_the_start = number == chain + 1
+        wait = dice.uniform(0.3, 2.0) if from_the_start else dice.uniform(0.05, 0.7)
+        ended, inside = kill(tools, directory, arguments, wait, from_the_start)
+        in_the_loop.append(inside)
+        if ended:
+            break
+    tools.finish(directory, arguments, "--resume")
+    tools.assert_same_runs(whole, directory)
+
+
+def test_most_kills_fell_into_the_time_loop(in_the_loop):
+    print(f"{sum(in_the_loop)} of {len(in_the_loop)} kills fell into the time loop")
+    if len(in_the_loop) < CHAINS:
+        pytest.skip("the chains ran elsewhere")
+    assert len(in_the_loop) >= 20
+    assert sum(in_the_loop) >= 15
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_killed_once(variant, tools, tmp_path):
+    arguments = tools.settings(*VARIANTS[variant])
+    tools.finish(tmp_path / "whole", arguments)
+    ended, inside = kill(tools, tmp_path / "cut", arguments, 0.15, from_the_start=False)
+    assert inside or ended
+    tools.finish(tmp_path / "cut", arguments, "--resume")
+    tools.assert_same_runs(tmp_path / "whole", tmp_path / "cut")

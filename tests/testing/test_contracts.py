@@ -1,0 +1,215 @@
+"""The contracts find faults: parts with one thing wrong each, and the test of the contract that says so."""
+
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from attrs import evolve, frozen
+
+from mpad_core import solver
+from mpad_core.arrays import Array
+from mpad_core.interfaces.values import Configuration, Motion, Report, Setting, SolverTraits
+from mpad_core.testing import (
+    BondModelContract,
+    GapForceContract,
+    MobilitySolverContract,
+    SurfaceContract,
+    typical,
+)
+
+REST, STIFF = 0.03, 1e4
+
+
+@frozen(kw_only=True)
+class Spring:
+    """A bond without a fault."""
+
+    name: ClassVar[str] = "spring"
+    rest_length: float = REST
+    fault: str = ""
+
+    def tension(self, length: Array) -> Array:
+        if self.fault == "writes to its input":
+            length -= self.rest_length
+            return STIFF * length
+        if self.fault == "pulls at rest":
+            return STIFF * length
+        if self.fault == "sums":
+            return STIFF * (length - self.rest_length) + 0 * length.sum() + (1.0 if length.size > 1 else 0.0)
+        return STIFF * (length - self.rest_length)
+
+    def off_rate(self, length: Array) -> Array:
+        stretch = length - self.rest_length
+        rates = {
+            "negative": -1.0 + 0 * length,
+            "not finite": np.where(stretch > 0.01, np.nan, 1.0),
+            "hidden kink": 1.0 + np.maximum(stretch - 0.00123, 0) * 1e4,
+            "dice": np.random.Generator(np.random.PCG64()).uniform(size=np.shape(length)),
+            "one number": 2.0,
+        }
+        rate: Array = np.asarray(rates.get(self.fault, 2.0 + 0 * length))
+        return rate
+
+    def breakpoints(self) -> tuple[float, ...]:
+        return (0.5 * self.rest_length,) if self.fault == "no node at rest" else (self.rest_length,)
+
+
+def bond_of(fault: str) -> BondModelContract:
+    contract = BondModelContract()
+    contract.model = Spring(fault=fault)
+    return contract
+
+
+BOND_FAULTS: list[tuple[str, Callable[[BondModelContract], None]]] = [
+    ("writes to its input", lambda c: c.test_pure()),
+    ("pulls at rest", lambda c: c.test_unstressed_at_the_rest_length()),
+    ("sums", lambda c: c.test_elementwise()),
+    ("negative", lambda c: c.test_finite_and_not_negative("slack")),
+    ("not finite", lambda c: c.test_finite_and_not_negative("slack")),
+    ("hidden kink", lambda c: c.test_followed_by_tables("slack")),
+    ("dice", lambda c: c.test_pure()),
+    ("one number", lambda c: c.test_elementwise()),
+    ("no node at rest", lambda c: c.test_breakpoints_hold_the_rest_length()),
+]
+
+
+@pytest.mark.parametrize(("fault", "law"), BOND_FAULTS, ids=[fault for fault, _ in BOND_FAULTS])
+def test_faulty_bonds_are_found(fault: str, law: Callable[[BondModelContract], None]) -> None:
+    law(bond_of(""))
+    with pytest.raises(Exception, match=r"."):
+        law(bond_of(fault))
+
+
+class TestSpring(BondModelContract):
+    """The spring itself is whole."""
+
+    model = Spring()
+
+
+@frozen(kw_only=True)
+class Skewed:
+    """The solver `rpb`, with its answers spoilt."""
+
+    name: ClassVar[str] = "skewed"
+    traits: ClassVar[SolverTraits] = SolverTraits()
+    fault: str = ""
+
+    def plan(self, setting: Setting) -> Any:
+        return setting
+
+    def prepare(self, plan: Any, configuration: Configuration, guess: Array | None = None) -> Any:
+        inner = solver("rpb")
+        at = configuration
+        if self.fault == "feels the place":
+            at = Configuration(centres=at.centres, radii=at.radii * (1 - 1e-3 * np.tanh(at.centres[0, 0])))
+        if self.fault == "answers NaN" and not np.isfinite(at.centres).all():
+            at = Configuration(centres=[[0, 0, 3.0], [5, 0, 3.0]], radii=[1.0, 1.0])
+        return inner, inner.prepare(inner.plan(plan), at), guess
+
+    def solve(self, prepared: Any, loads: Array) -> Motion:
+        inner, ready, guess = prepared
+        answer: Motion = inner.solve(ready, loads)
+        velocity = answer.velocity.copy()
+        if self.fault == "skew":
+            velocity[:, 0] += 1e-4 * loads[:, 1]
+        if self.fault == "indefinite":
+            velocity -= 1e-1 * loads
+        if self.fault == "not linear":
+            velocity += 1e-3 * np.abs(loads)
+        if self.fault == "believes its guess":
+            velocity += 0.0 if guess is None else 1e-3
+        if self.fault == "boasts":
+            velocity = 1.01 * velocity
+            return evolve(answer, velocity=velocity, report=Report(error=1e-6))
+        if self.fault == "first column only" and velocity.ndim == 3:
+            velocity[...] = velocity[..., :1]
+        return evolve(answer, velocity=velocity, guess=velocity)
+
+
+def solver_of(fault: str) -> MobilitySolverContract:
+    contract = MobilitySolverContract()
+    contract.solver = Skewed(fault=fault)
+    return contract
+
+
+SOLVER_FAULTS: list[tuple[str, Callable[[MobilitySolverContract], None]]] = [
+    ("skew", lambda c: c.test_symmetric(True)),
+    ("skew", lambda c: c.test_mirrored(True)),
+    ("skew", lambda c: c.test_turns_with_the_configuration(True)),
+    ("indefinite", lambda c: c.test_positive_definite(True)),
+    ("indefinite", lambda c: c.test_scales(True)),
+    ("feels the place", lambda c: c.test_same_anywhere_along_the_wall(True)),
+    ("feels the place", lambda c: c.test_names_of_spheres_do_not_matter(True)),
+    ("not linear", lambda c: c.test_superposes(True)),
+    ("first column only", lambda c: c.test_block_is_its_columns(True)),
+    ("believes its guess", lambda c: c.test_warm_start_changes_nothing(True)),
+    ("boasts", lambda c: c.test_lone_sphere_is_as_good_as_claimed(True, 0.3)),
+    ("answers NaN", lambda c: c.test_refuses_what_is_no_number()),
+]
+
+
+@pytest.mark.parametrize(
+    ("fault", "law"), SOLVER_FAULTS, ids=[f"{fault}-{i}" for i, (fault, _) in enumerate(SOLVER_FAULTS)]
+)
+def test_faulty_solvers_are_found(fault: str, law: Callable[[MobilitySolverContract], None]) -> None:
+    law(solver_of(""))
+    with pytest.raises(BaseException, match=r"."):  # pytest's own Failed is no Exception
+        law(solver_of(fault))
+
+
+@frozen(kw_only=True)
+class Striped:
+    """A surface whose bound is too low, or is not."""
+
+    name: ClassVar[str] = "striped"
+    bound: float = 200.0
+
+    def density(self, x: Array, y: Array) -> Array:
+        return np.broadcast_arrays(100.0 * (1 + np.sin(x)), y)[0]
+
+    def densest(self) -> float:
+        return self.bound
+
+
+def test_surface_above_its_bound_is_found() -> None:
+    contract = SurfaceContract()
+    contract.surface = Striped()
+    contract.test_bounded()
+    contract.surface = Striped(bound=150.0)
+    with pytest.raises(AssertionError):
+        contract.test_bounded()
+
+
+@frozen(kw_only=True)
+class Ramp:
+    """A force law that ends abruptly, or pulls."""
+
+    name: ClassVar[str] = "ramp"
+    slope: float = -1.0
+    end: float = 1.0
+
+    def force(self, gap: Array) -> Array:
+        return self.slope * (gap - self.end)
+
+    def gaps(self) -> tuple[float, float]:
+        return 0.1, 1.0
+
+
+def test_faulty_forces_are_found() -> None:
+    contract = GapForceContract()
+    contract.force = Ramp()
+    contract.test_ends_in_nothing()
+    contract.test_keeps_surfaces_apart()
+    contract.force = Ramp(end=1.5)
+    with pytest.raises(AssertionError, match="vanishes"):
+        contract.test_ends_in_nothing()
+    contract.force = Ramp(slope=1.0)
+    with pytest.raises(AssertionError):
+        contract.test_keeps_surfaces_apart()
+
+
+def test_typical_takes_defaults_and_what_is_given() -> None:
+    assert typical(Spring) == Spring()
+    assert typical(Spring, rest_length=0.05).rest_length == 0.05
+    assert typical(Ramp, end=2.0).end == 2.0
