@@ -98,7 +98,7 @@ def test_an_own_on_rate_is_respected(species: Any) -> None:
     x = np.linspace(0, 0.1, 30)
     assert (law.on_rate(x) == law.species.model.on_rate(x)).all()
     tables = law.tables()
-    for at in (0.01, 0.05, 0.07):
+    for at in (0.045, 0.05, 0.07):
         assert value(tables, 0, 2, at) == pytest.approx(7 / (1 + (at / 0.05) ** 8), rel=2 * TABLE_ERROR)
 
 

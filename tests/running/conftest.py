@@ -51,7 +51,7 @@ def _text(
         f'[flow]\nkind = "shear"\nrate = "{shear!r} 1/s"' if shear else "",
         '[gravity]\nacceleration = ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]' if excess else "",
         '[wall]\nroughness = "50 nm"' if wall else "",
-        f'sites = {{ selectin = {{ layout = "uniform", density = "{wall_sites!r} 1/um^2" }} }}' if wall and bond else "",
+        f'sites = {{ selectin = {{ layout = "uniform", density = "{wall_sites!r} 1/um^2" }} }}' if wall and bond is not None else "",
         f'[kinds.bead]\nradius = "5 um"\nroughness = "175 nm"\ndensity = "{1000 + excess!r} kg/m^3"',
         f'sites = {{ slex = {{ density = "{sites!r} 1/um^2" }} }}' if bond is not None else "",
         *(f'[cells.{name}]\nkind = "bead"\n{keys}' for name, keys in cells.items()),

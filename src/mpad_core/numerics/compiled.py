@@ -46,13 +46,13 @@ def _fingerprint() -> str:
 
 def _cache_directory() -> Path:
     """Give a directory that exists, is private and can be written; the temporary one where the user's cannot."""
-    home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    wanted = Path(home) / "mpad" / _fingerprint()
     try:
+        home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+        wanted = Path(home) / "mpad" / _fingerprint()
         wanted.mkdir(parents=True, exist_ok=True, mode=0o700)
         if not os.access(wanted, os.W_OK):
             raise PermissionError(wanted)
-    except OSError:
+    except (OSError, RuntimeError):  # not writable; or a user without a home
         return Path(tempfile.mkdtemp(prefix="mpad-numba-"))
     return wanted
 

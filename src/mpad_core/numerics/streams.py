@@ -39,7 +39,7 @@ _ROUNDS = 10
 
 def key_of(seed: int, replicate: int = 0) -> np.uint64:
     """Give the 64-bit key of a seed and a replicate; nearby seeds give unrelated keys."""
-    return np.uint64(np.random.SeedSequence((seed, replicate)).generate_state(1, np.uint64)[0])
+    return np.uint64(np.random.SeedSequence(seed, spawn_key=(replicate,)).generate_state(1, np.uint64)[0])
 
 
 @compiled

@@ -132,7 +132,7 @@ def _placed(scene: Scene) -> tuple[dict[str, Cell | Group], Array]:
     places = [[cell.x, cell.y, scene.height_of(cell)] for cell in scene.cells.values()]
     radii = [scene.kinds[cell.kind].radius for cell in scene.cells.values()]
     for name, group in scene.groups.items():
-        seeds = np.random.SeedSequence((scene.seed, zlib.crc32(name.encode())))
+        seeds = np.random.SeedSequence(scene.seed, spawn_key=(zlib.crc32(name.encode()),))
         draws = np.random.Generator(np.random.Philox(seeds))
         radius, height = scene.kinds[group.kind].radius, scene.height_of(group)
         for number in range(group.number):

@@ -17,6 +17,7 @@ from mpad_core.testing.strategies import numbers, tried
 
 _SHARES = st.lists(numbers(0.0, 1.0), min_size=1, max_size=20).map(np.array)
 _TENSION, _OFF_RATE, _ON_RATE = 0, 1, 2
+_BETWEEN_CHECKS = 1.1  # tables are checked at some points of each cell; between them a cubic may be off by 7 % more
 BOTH = pytest.mark.parametrize("compression", ["slack", "linear"])
 
 
@@ -82,6 +83,13 @@ class BondModelContract:
         assert np.isfinite(rates).all()
         assert (rates >= 0).all()
 
+    def test_ends_with_a_number(self) -> None:
+        """Tables end where the bond breaks at once or is too strong to matter, not where the model stops answering."""
+        rest, top = self.rest_length, self.law().edges()[-1]
+        with np.errstate(over="ignore"):
+            beyond = np.asarray(self.model.off_rate(rest + (top - rest) * np.array([1.0, 1.01])))
+        assert not np.isnan(beyond).any(), f"the off-rate is no number just above {top:.4g} um"
+
     def test_breakpoints_hold_the_rest_length(self) -> None:
         """Without a node at the rest length no table follows the model."""
         points = self.model.breakpoints()
@@ -107,7 +115,7 @@ class BondModelContract:
             truth = function(lengths)
             # a length just above the rest length has lost digits of its own: rounding, not the table
             wrong = np.abs(looked_up - truth) - 1e-10 * np.abs(function(self.lengths(np.ones(1), compression)))
-            check("tables follow the model", "relative", 1.01 * TABLE_ERROR, _largest(wrong, truth))
+            check("tables follow the model", "relative", _BETWEEN_CHECKS * TABLE_ERROR, _largest(wrong, truth))
 
     @BOTH
     @given(shares=_SHARES)

@@ -31,7 +31,8 @@ class Claim:
 
     def __str__(self) -> str:
         """Give the claim as one line of a table."""
-        return f"{self.claim} ({self.source}): expected at most {self.expected:.3g}, found {self.found:.3g}: {self.verdict}"
+        numbers = f"expected at most {self.expected:.3g}, found {self.found:.3g}"
+        return f"{self.claim} ({self.source}): {numbers}: {self.verdict}"
 
     def check(self) -> None:
         """Raise if the claim fails.

@@ -79,8 +79,10 @@ class SolvingContract(AskedSolver):
         if len(at.radii) < 2:
             pytest.skip(f"{self.solver.name} treats one sphere only")
         forces = some_loads((2, 3))
-        asked = {"viscosity": setting.viscosity, "shear_rate": setting.shear_rate, "forces": forces}
-        moved = velocities(self.solver, at.centres, at.radii, held=[1], **asked)
+        moved = velocities(
+            self.solver, at.centres, at.radii, viscosity=setting.viscosity, shear_rate=setting.shear_rate,
+            forces=forces, held=[1],
+        )  # fmt: skip
         assert (moved[1] == 0).all()
         matrix, free = self.matrix(setting, at), self.free(setting, at).ravel()
         load = np.zeros(12)
