@@ -1,4 +1,4 @@
-"""Dembo's spring: stretching changes the energy of the bond and of its transition state, each with its own stiffness."""
+"""Dembo's spring: the bond and its transition state have each their own stiffness, and the rate follows the energies."""
 
 from typing import ClassVar
 

@@ -64,7 +64,7 @@ def test_frames_come_at_every_step_of_time_or_place(folder):
     assert (apart <= every.dx * (1 + 1e-9)).all()
     assert (lasted <= every.time * (1 + 1e-9)).all()
     due = np.isclose(apart, every.dx, rtol=1e-9) | np.isclose(lasted, every.time, rtol=1e-9)
-    assert due.all()
+    assert due[:-1].all()  # the last frame is that of the end
 
 
 def test_the_overlap_is_the_height_above_zero_overlap(folder, problem):
@@ -88,13 +88,11 @@ def test_the_table_of_events_rebuilds_the_living_bonds(folder):
         return
     assert len(rebuilt) > 5
     same = np.lexsort((sites, cells))
-    first = {int(cell): sites[cells == cell].min() for cell in np.unique(cells)}
     assert np.array_equal(rebuilt["cell"][order], cells[same])
     assert np.array_equal(rebuilt["receptor"][order], sites[same])  # the binding cell is the first: its sites too
     assert np.array_equal(rebuilt["species"][order], kept["bonds.species"][same])
     anchors = np.stack([rebuilt["anchor_x"], rebuilt["anchor_y"]], axis=1)
     assert np.array_equal(anchors[order], kept["bonds.anchor"][same, :2])
-    assert first
 
 
 def test_bond_counts_are_those_of_the_events(folder):
@@ -125,10 +123,11 @@ def test_events_lie_in_order_within_the_run(folder):
         assert (events["length"] > 0).all()
 
 
-def test_the_last_frame_lies_within_a_cadence_of_the_end(folder):
+def test_the_last_frame_is_that_of_the_end(folder):
     trajectory = read_trajectory(folder / "trajectory.h5")
-    end = float(read_checkpoint(folder / "checkpoint.npz")["state.time"])
-    assert end - 0.01 * (1 + 1e-9) <= trajectory.times[-1] <= end
+    kept = read_checkpoint(folder / "checkpoint.npz")
+    assert trajectory.times[-1] == float(kept["state.time"])
+    assert np.array_equal(trajectory.positions[-1], kept["state.centres"])
 
 
 def test_the_summary_says_what_the_files_say(finished):

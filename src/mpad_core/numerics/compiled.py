@@ -44,17 +44,24 @@ def _fingerprint() -> str:
     return digest.hexdigest()[:20]
 
 
+def _cache_homes() -> Iterator[Path]:
+    """Yield where the cache may lie: as the environment says, in the user's home, in the temporary directory."""
+    yield from (Path(os.environ[name]) for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME") if os.environ.get(name))
+    with contextlib.suppress(RuntimeError):  # a user may have no home
+        yield Path.home() / ".cache"
+    yield Path(tempfile.gettempdir()) / f"mpad-{os.getuid()}"
+
+
 def _cache_directory() -> Path:
-    """Give a directory that exists, is private and can be written; the temporary one where the user's cannot."""
-    try:
-        home = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-        wanted = Path(home) / "mpad" / _fingerprint()
-        wanted.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if not os.access(wanted, os.W_OK):
-            raise PermissionError(wanted)
-    except (OSError, RuntimeError):  # not writable; or a user without a home
-        return Path(tempfile.mkdtemp(prefix="mpad-numba-"))
-    return wanted
+    """Give a directory that can be written and is the user's own."""
+    for home in _cache_homes():
+        wanted = home / "mpad" / _fingerprint()
+        with contextlib.suppress(OSError):
+            wanted.mkdir(parents=True, exist_ok=True, mode=0o700)
+            wanted.chmod(0o700)  # refused where it is somebody else's
+            if os.access(wanted, os.W_OK):
+                return wanted
+    return Path(tempfile.mkdtemp(prefix="mpad-numba-"))
 
 
 # not through the environment, which child processes would inherit

@@ -9,7 +9,7 @@ push there.
 from itertools import pairwise
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 from numpy.polynomial.legendre import leggauss
 
 from mpad_core.arrays import Array
@@ -19,6 +19,7 @@ from mpad_core.physics.problem import BondSpecies
 
 TABLE_ERROR = 1e-6
 _NEGLIGIBLE = 1e-9  # of the unstressed on-rate: beyond, no bond forms
+_FALLEN = 1e-3  # of its largest value: an on-rate that has fallen so far at ten rest lengths has a reach of its own
 _INSTANT = 1e8  # 1/s: a bond that breaks faster does not live through any sub-step
 _STRONG = 1e6  # pN: no bond of any cell comes near
 _FARTHEST = 30.0  # rest lengths; tables end here at the latest, and go on by their tangent
@@ -67,17 +68,28 @@ class BondLaw:
         balanced: Array = self.species.on_rate * ratio * np.exp(-self.energy(length) / self.species.kT)
         return balanced
 
-    def reach(self) -> float:
-        """Give the length (µm) beyond which no bond forms: where the on-rate has become negligible."""
+    def binding_lengths(self) -> tuple[float, float]:
+        """Give the lengths (µm) between which bonds form; beyond, the on-rate is negligible, or has not been asked.
+
+        An on-rate that hardly falls with length says nothing about reach: the unstressed bond does.
+        """
         rest = self.species.rest_length
-        lengths = rest * (1 + np.concatenate([[0.0], np.geomspace(1e-6, 9.0, 4000)]))
+        steps = np.concatenate([[0.0], np.geomspace(1e-6, 9.0, 4000)])
         with np.errstate(over="ignore", invalid="ignore"):
-            rates = np.nan_to_num(self.on_rate(lengths))
-        if not rates.max() > 0:
-            return rest
-        alive = np.flatnonzero(rates > _NEGLIGIBLE * rates.max())
-        # an on-rate that does not fall with length says nothing about reach: the unstressed bond does
-        return rest if alive[-1] == len(lengths) - 1 else float(lengths[alive[-1] + 1])
+            longer = np.nan_to_num(self.on_rate(rest * (1 + steps)))
+            shorter = np.nan_to_num(self.on_rate(rest * np.maximum(1 - steps, 0.0)))
+        least = _NEGLIGIBLE * max(longer.max(), shorter.max())
+        if not least > 0:
+            return 0.0, rest
+        end = len(steps) - 1
+        last = min(int(np.flatnonzero(longer > least)[-1]) + 1, end)
+        first = min(int(np.flatnonzero(shorter > least)[-1]) + 1, end)
+        falls = longer[-1] < _FALLEN * longer.max()
+        return rest * max(1 - steps[first], 0.0), rest * (1 + steps[last]) if falls else rest
+
+    def reach(self) -> float:
+        """Give the length (µm) beyond which no bond forms."""
+        return self.binding_lengths()[1]
 
     def _bounded(self, lengths: Array) -> float:
         """Give the last of the lengths, walking away from rest, at which the bond is of any consequence."""
@@ -87,13 +99,14 @@ class BondLaw:
 
     def edges(self) -> list[float]:
         """Give the ends and the breakpoints of the tables."""
-        rest, reach = self.species.rest_length, self.reach()
+        rest = self.species.rest_length
+        nearest, reach = self.binding_lengths()
         steps = np.concatenate([[0.0], np.geomspace(1e-4, _FARTHEST, 2000)])
         top = max(self._bounded(rest * (1 + steps)), reach * (1 + 1e-9), rest * (1 + 1e-3))
         bottom = 0.0
         if self.species.compression == "linear":
             bottom = self._bounded(np.maximum(rest * (1 - steps), 0.0))
-        inner = {rest, reach, *self.species.model.breakpoints()}
+        inner = {rest, nearest, reach, *self.species.model.breakpoints()}
         return [bottom, *sorted(b for b in inner if bottom < b < top), top]
 
     def tables(self) -> Tables:
@@ -104,11 +117,11 @@ class BondLaw:
         PartError
             If a table cannot follow the model.
         """
-        reach = self.reach()
+        nearest, reach = self.binding_lengths()
 
         def on_rate(length: Array) -> Array:
-            within = length <= reach
-            return np.where(within, self.on_rate(np.minimum(length, reach)), 0.0)
+            within = (length >= nearest) & (length <= reach)
+            return np.where(within, self.on_rate(np.clip(length, nearest, reach)), 0.0)
 
         try:
             return tabulate([self.tension, self.off_rate, on_rate], self.edges(), error=TABLE_ERROR, tangents=[0])
@@ -147,6 +160,8 @@ class HazardTable:
 
 def hazard_table(law: BondLaw, k_on: float | None = None) -> HazardTable:
     """Integrate the on-rate of a species; `k_on` replaces its unstressed on-rate (1/s)."""
+    if k_on is not None:
+        law = BondLaw(species=evolve(law.species, on_rate=k_on))
     reach = law.reach()
     gaps = np.linspace(-4 * reach, reach, 20_001)
     lengths = np.maximum(gaps, law.species.rest_length if law.species.compression == "linear" else 0.0)
@@ -158,8 +173,7 @@ def hazard_table(law: BondLaw, k_on: float | None = None) -> HazardTable:
         inner = np.concatenate([[0.0], np.cumsum(_mean(law.on_rate(x) * x) * np.diff(x))])
         rates = 2 * np.pi * law.species.at_density * (inner[-1] - np.interp(np.maximum(gaps, 0.0), x, inner))
     total = np.concatenate([[0.0], np.cumsum(_mean(rates) * np.diff(gaps))])
-    scale = 1.0 if k_on is None else k_on / law.species.on_rate
-    return HazardTable(tip_gaps=gaps, integral=scale * (total[-1] - total))
+    return HazardTable(tip_gaps=gaps, integral=total[-1] - total)
 
 
 def _mean(values: Array) -> Array:
