@@ -1,4 +1,4 @@
-"""Dembo's spring: the bond and its transition state have each their own stiffness, and the rate follows the energies."""
+"""Dembo's spring: a bond and its transition state each have a stiffness, and the rate follows their energies."""
 
 from typing import ClassVar
 

@@ -43,11 +43,3 @@ def test_checking_a_scene_never_loads_numba(name: str) -> None:
     found = loaded_by(f"from mpad_core import cli\nimport sys\nsys.argv[1:] = {arguments}\ncli.main()")
     assert "numba" not in found
     assert "h5py" not in found
-
-
-def test_no_module_of_the_core_is_heavier_than_it_may_be() -> None:
-    """Files stay readable: 400 lines at most, tables of numbers aside."""
-    for file in (ROOT / "src").rglob("*.py"):
-        if file.name.startswith("_wall_table"):
-            continue
-        assert len(file.read_text(encoding="utf-8").splitlines()) <= 400, file

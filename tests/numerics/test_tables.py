@@ -59,7 +59,7 @@ def relative(found: Any, true: Any) -> float:
 
 @pytest.mark.parametrize("column", [0, 1, 2])
 def test_follows_to_the_stated_error(column: int) -> None:
-    """Between the points where the error is measured it is less than twice what it is there: E ~ t(t-1/3)(t-2/3)(t-1)."""
+    """The error is measured near its largest values: elsewhere in a cell it is less than twice as large."""
     x = np.concatenate([np.random.default_rng(1).uniform(0, 1, 4000), np.linspace(0, 1, 2001)[:-1]])
     tables = made()
     assert relative(looked_up(tables, column, x), FUNCTIONS[column](x)) < 2 * ERROR

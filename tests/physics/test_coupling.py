@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from attrs import evolve
 
 from mpad_core.interfaces.errors import PartError, RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting, SolverTraits
@@ -98,9 +99,7 @@ def test_several_groups_give_the_full_velocities_under_the_mean_loads(
     problem: Any, monkeypatch: pytest.MonkeyPatch, held: tuple[int, ...], largest: int
 ) -> None:
     monkeypatch.setattr(coupling, "LARGEST_GROUP", largest)
-    asked = problem(
-        [[0, 0, 5.3], [14, 1, 6.0], [60, 30, 7.5], [74, 31, 6.5]], held=np.isin(np.arange(4), held)
-    )
+    asked = problem([[0, 0, 5.3], [14, 1, 6.0], [60, 30, 7.5], [74, 31, 6.5]], held=np.isin(np.arange(4), held))
     loads = weights(4)
     found = coupler(asked).at(at(asked), loads, None)
     assert len(found.groups) > 1
@@ -213,10 +212,7 @@ class Broken:
 def test_a_mobility_that_is_not_definite_is_refused_by_name(problem: Any) -> None:
     matrix = np.diag([1.0] * 11 + [-1.0])
     asked = problem(CENTRES[:2])
-    bad = coupling.SolverCoupling(
-        problem=type(asked)(**{f: getattr(asked, f) for f in asked.__slots__ if f != "__weakref__"} | {"solver": Broken(matrix)}),
-        plan=None, speed=1.0, touching=0.0,
-    )  # fmt: skip
+    bad = coupling.SolverCoupling(problem=evolve(asked, solver=Broken(matrix)), plan=None, speed=1.0, touching=0.0)
     with pytest.raises(RefusedError, match=r"broken.*c0, c1"):
         bad.at(at(asked), np.zeros((2, 6)), None)
 

@@ -79,5 +79,11 @@ def test_no_molecules_at_all(problem: Any) -> None:
 
 
 def test_identities_of_names_differ() -> None:
-    names = [f"{stem}-{i}" for stem in ("free", "cell", "a", "ß") for i in range(500)] + ["", "a", "ab", "abcd", "abcde"]
+    names = [f"{stem}-{i}" for stem in ("free", "cell", "a", "ß") for i in range(500)] + [
+        "",
+        "a",
+        "ab",
+        "abcd",
+        "abcde",
+    ]
     assert len({int(identity_of(name)) for name in names}) == len(names)

@@ -34,9 +34,7 @@ def test_mobility_does_not_depend_on_the_units(name: str, wall: bool) -> None:
 def test_velocities_do_not_depend_on_the_units(name: str, held: tuple[int, ...], loaded: bool) -> None:
     length, force = MICRO
     f, t = (FORCES, TORQUES) if loaded else (None, None)
-    inner = velocities(
-        solver(name), CENTRES, RADII, viscosity=1e-3, shear_rate=80.0, forces=f, torques=t, held=held
-    )
+    inner = velocities(solver(name), CENTRES, RADII, viscosity=1e-3, shear_rate=80.0, forces=f, torques=t, held=held)
     si = velocities(
         solver(name), CENTRES * length, RADII * length, viscosity=1e-3 * force / length**2, shear_rate=80.0,
         forces=FORCES * force if loaded else None, torques=TORQUES * force * length if loaded else None, held=held,
@@ -165,5 +163,5 @@ def test_what_a_solver_cannot_treat_is_refused_before_any_solve(lacking: Any, ne
 
 
 def test_a_solver_without_torques_is_not_asked_for_them() -> None:
-    with pytest.raises(InputError, match="limited.*torque"):
+    with pytest.raises(InputError, match=r"limited.*torque"):
         velocities(Limited(torques=False), CENTRES, RADII, viscosity=1.0, torques=TORQUES)

@@ -51,7 +51,9 @@ def _text(
         f'[flow]\nkind = "shear"\nrate = "{shear!r} 1/s"' if shear else "",
         '[gravity]\nacceleration = ["0 m/s^2", "0 m/s^2", "-9.81 m/s^2"]' if excess else "",
         '[wall]\nroughness = "50 nm"' if wall else "",
-        f'sites = {{ selectin = {{ layout = "uniform", density = "{wall_sites!r} 1/um^2" }} }}' if wall and bond is not None else "",
+        f'sites = {{ selectin = {{ layout = "uniform", density = "{wall_sites!r} 1/um^2" }} }}'
+        if wall and bond is not None
+        else "",
         f'[kinds.bead]\nradius = "5 um"\nroughness = "175 nm"\ndensity = "{1000 + excess!r} kg/m^3"',
         f'sites = {{ slex = {{ density = "{sites!r} 1/um^2" }} }}' if bond is not None else "",
         *(f'[cells.{name}]\nkind = "bead"\n{keys}' for name, keys in cells.items()),
@@ -86,10 +88,10 @@ class Lab:
         return list(march(machine, at_rest(machine) if state is None else state, until))
 
     def last(self, machine: Machine, until: float, state: State | None = None) -> State:
-        for state in march(machine, at_rest(machine) if state is None else state, until):
-            pass
-        assert state is not None
-        return state
+        reached = at_rest(machine) if state is None else state
+        for following in march(machine, reached, until):
+            reached = following
+        return reached
 
     def with_molecules(self, machine: Machine, arms: list[Array]) -> Machine:
         """Replace every cell's molecules by these (µm, in the cell's frame), all of the first kind."""

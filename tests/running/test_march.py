@@ -1,10 +1,12 @@
 """Whole marches against what is known exactly: free motion, settling, tethers, symmetry, reversal."""
 
+from itertools import pairwise
 from typing import Any
 
 import numba
 import numpy as np
 import pytest
+from attrs import evolve
 from scipy.integrate import quad
 from scipy.optimize import brentq, least_squares
 from scipy.spatial.transform import Rotation
@@ -267,7 +269,7 @@ def test_gap_and_height_stay_together(lab: Any) -> None:
 def test_drift_is_displacement_and_turn_over_the_outer_step(lab: Any) -> None:
     """Of a rolling cell, whose velocity changes at every bond's birth and death."""
     marched = lab.states(lab.machine({"a": 'overlap = "-20 nm"'}, **ROLLING), 0.05)
-    for before, after in zip(marched[5:], marched[6:], strict=False):
+    for before, after in pairwise(marched[5:]):
         lasted = after.time - before.time
         assert after.drift[0, :3] * lasted == pytest.approx(after.centres[0] - before.centres[0], abs=1e-12)
         turn = Rotation.from_quat(after.orientations[0], scalar_first=True)
@@ -315,3 +317,19 @@ def test_a_solver_whose_answer_no_step_can_balance_is_named(lab: Any, monkeypatc
     monkeypatch.setattr(marching, "burst", lambda *_: (marching.NO_BALANCE, 0, 0))
     with pytest.raises(RefusedError, match=r"step 0, t = 0 s: no sub-step.*a \(gap to the wall 1 um\).*rpb"):
         lab.last(machine, 0.01, state)
+
+
+def test_a_coupling_that_is_not_definite_is_refused(lab: Any) -> None:
+    machine = lab.machine({"a": 'height = "6 um"'}, shear=80.0)
+    state = lab.start(machine)
+    coupling = machine.coupler.at(marching.configuration_of(machine.problem, state), state.mean_loads, None)
+    spoilt = evolve(coupling, matrices=(-np.eye(6),))
+
+    class Spoilt:
+        plan = None
+
+        def at(self, *_: Any) -> Any:
+            return spoilt
+
+    with pytest.raises(RefusedError, match=r"step 0, t = 0 s: resistance is not positive definite for a"):
+        lab.last(evolve(machine, coupler=Spoilt()), 0.01, state)

@@ -12,7 +12,15 @@ from mpad_core.numerics.streams import mixed, uniform
 from mpad_core.physics.coupling import lone_cell
 from mpad_core.running import assembly, moving
 from mpad_core.running.layout import Attached
-from mpad_core.running.moving import DONE, TOO_LONG, advance, attach, is_positive_definite, refresh_turns, solve_in_place
+from mpad_core.running.moving import (
+    DONE,
+    TOO_LONG,
+    advance,
+    attach,
+    is_positive_definite,
+    refresh_turns,
+    solve_in_place,
+)
 
 STIFFNESS, REST, STRENGTH, DECAY = 1e5, 0.03, 500.0, 565.0
 
@@ -69,7 +77,7 @@ def rolling(lab: Any) -> Any:
     machine = lab.with_molecules(made, [arms([[0, 0, -1], [0.02, 0, -1], [-0.05, 0.01, -1], [0.04, -0.06, -1]])])
     arm = machine.fixed.molecules.arm
     under = machine.problem.start[0] + arm
-    anchors = under + [[0, 0, 0], [-0.0295, 0, 0], [-0.04, 0.01, 0], [0, -0.05, 0]]
+    anchors = under + np.array([[0, 0, 0], [-0.0295, 0, 0], [-0.04, 0.01, 0], [0, -0.05, 0]])
     anchors[:, 2] = 0.05
     return machine, lab.bound(machine, range(4), anchors)
 
@@ -106,9 +114,7 @@ def test_newton_balances_all_loads(rolling: Any, dt: float) -> None:
     assert bench.advance(dt) == DONE
     found = bench.motion.velocity[0]
     scale = np.array([1, 1, 1, 5, 5, 5.0])
-    solved = root(
-        lambda v: balance(v / scale, dt, machine, state) / scale, np.zeros(6), tol=1e-13, method="hybr"
-    )
+    solved = root(lambda v: balance(v / scale, dt, machine, state) / scale, np.zeros(6), tol=1e-13, method="hybr")
     expected = solved.x / scale
     assert np.abs(balance(expected, dt, machine, state)).max() < 1e-6
     close = 1e-4 * np.abs(expected * scale).max() + 2e-8 / dt  # Newton ends at steps of 1e-8 µm
@@ -156,7 +162,9 @@ def test_stiffness_and_third_law_of_pair_contact(lab: Any, held: int | None) -> 
     places = [np.array([0, 0, 8.0]), np.array([0, 0, 8.0]) + 10.354 * first]
     places.append(places[1] + 10.356 * second)
     cells = {
-        name: "\n".join(f'{axis} = "{at!r} um"' for axis, at in zip(("x", "y", "height"), map(float, place), strict=True))
+        name: "\n".join(
+            f'{axis} = "{at!r} um"' for axis, at in zip(("x", "y", "height"), map(float, place), strict=True)
+        )
         + ("\nheld = true" if i == held else "")
         for i, (name, place) in enumerate(zip("abc", places, strict=True))
     }
