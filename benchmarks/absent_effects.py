@@ -10,6 +10,7 @@ of the thread) on scenes without bonds and repulsion; they must also give the sa
 import argparse
 import ast
 import inspect
+import re
 import statistics
 import time
 from collections.abc import Sequence
@@ -60,7 +61,7 @@ class Striking(ast.NodeTransformer):
         self.struck = 0
 
     def _without(self, node: Any, text: str) -> Any:
-        if any(name in text for name in self.gone):
+        if any(re.search(rf"\b{re.escape(name)}\b", text) for name in self.gone):
             self.struck += 1
             return ast.Pass()
         self.generic_visit(node)

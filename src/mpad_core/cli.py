@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from mpad_core.interfaces.errors import DiskFullError, MpadError
+from mpad_core.interfaces.errors import DiskFullError, MpadError, PartError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -29,8 +29,20 @@ class _Commands(click.Group):
 
         if name not in {part.name for part in installed("command")}:
             return None
-        command: click.Command = load("command", name)
+        try:
+            command: click.Command = load("command", name)
+        except PartError as error:
+            return _broken(name, error)
         return command
+
+
+def _broken(name: str, error: PartError) -> click.Command:
+    """Stand in for a command whose plugin cannot be loaded, so that all others go on."""
+
+    def fail() -> None:
+        raise error
+
+    return click.Command(name, callback=fail, short_help="(broken plugin)")
 
 
 @click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -111,3 +123,9 @@ def main() -> None:
             sys.stderr.flush()
             os._exit(error.exit_code)  # HDF5 ends in a segmentation fault when it closes a file on a full disk
         sys.exit(error.exit_code)
+    except Exception as error:
+        if os.environ.get("MPAD_DEBUG"):
+            raise
+        message = " ".join(str(error).split())
+        click.echo(f"{type(error).__name__}: {message} (set MPAD_DEBUG=1 to see where)", err=True)
+        sys.exit(PartError.exit_code)

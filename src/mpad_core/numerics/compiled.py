@@ -26,8 +26,9 @@ _CANNOT_TAKE_PART = {"scene", "records", "studies", "testing", "plugins"}  # no 
 
 
 def _packages() -> Iterator[Path]:
-    names = {"mpad_core"} | {entry.module.partition(".")[0] for entry in entry_points(group="mpad")}
-    for name in sorted(names):
+    values = (entry.value.replace(":", ".") for entry in entry_points(group="mpad"))  # some may be malformed
+    names = {"mpad_core"} | {value.partition(".")[0].strip() for value in values}
+    for name in sorted(names - {""}):
         spec = find_spec(name)
         if spec is not None and spec.submodule_search_locations:
             yield Path(next(iter(spec.submodule_search_locations)))

@@ -18,6 +18,7 @@ from mpad_core.interfaces.errors import PartError, RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion, Setting
 from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
+from mpad_core.physics import asking
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.questions import constrained_motion, unit_load
 
@@ -72,7 +73,7 @@ def free_motion(
     size = np.tile(unit_load(setting.viscosity, float(configuration.radii.max()), speed), n)
     loads = np.zeros((6 * n, 6 * n + 1))
     loads[:, :-1] = np.diag(size)
-    motion = solver.solve(solver.prepare(plan, configuration), loads.reshape(n, 6, 6 * n + 1))
+    motion = asking.solve(solver, asking.prepare(solver, plan, configuration), loads.reshape(n, 6, 6 * n + 1))
     answer = motion.velocity.reshape(6 * n, 6 * n + 1)
     mobility = (answer[:, :-1] - answer[:, -1:]) / size
     size_of = np.sqrt(np.abs(np.diag(mobility)))
@@ -83,20 +84,30 @@ def free_motion(
 
 @frozen(kw_only=True, eq=False)
 class NoCoupling:
-    """The null object: every cell alone, which the wall functions treat exactly."""
+    """The null object: every cell alone with the fluid, which the wall functions treat exactly."""
 
     problem: Problem
+    touching: float  # µm, smooth gap below which cells may be in contact, and so must be solved together
     plan: Any = None
 
     def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
-        """Give zero, every free cell its own group."""
-        free = np.flatnonzero(~self.problem.held)
-        zero = np.zeros((6, 6))
-        return Coupling(
-            groups=tuple(free[i : i + 1] for i in range(len(free))),
-            matrices=tuple(zero for _ in free),
-            loads=np.zeros((len(self.problem.radii), 6)),
-        )
+        """Give zero; free cells share a group only where they may touch."""
+        groups = linked(configuration, np.flatnonzero(~self.problem.held), self.touching)
+        matrices = tuple(np.zeros((6 * len(group), 6 * len(group))) for group in groups)
+        return Coupling(groups=groups, matrices=matrices, loads=np.zeros((len(self.problem.radii), 6)))
+
+
+def linked(configuration: Configuration, cells: Indices, within: float) -> tuple[Indices, ...]:
+    """Put cells into groups linked by smooth gaps of at most `within` (µm)."""
+    from scipy.sparse.csgraph import connected_components
+
+    if len(cells) < 2:
+        return (cells,) if len(cells) else ()
+    between = configuration.centres[cells][:, None] - configuration.centres[cells][None]
+    radii = configuration.radii[cells]
+    gaps = np.linalg.norm(between, axis=2) - radii[:, None] - radii[None]
+    labels = connected_components(gaps <= within, directed=False)[1]
+    return tuple(cells[labels == label] for label in range(labels.max() + 1))
 
 
 def group_cells(configuration: Configuration, held: Any, touching: float) -> tuple[Indices, ...]:
@@ -104,20 +115,15 @@ def group_cells(configuration: Configuration, held: Any, touching: float) -> tup
 
     Cells nearer than `touching` (µm) share a group whatever its size, since their contact must be solved together.
     """
-    from scipy.sparse.csgraph import connected_components
-
     free = np.flatnonzero(~np.asarray(held))
     if len(free) <= LARGEST_GROUP:
         return (free,) if len(free) else ()
-    between = configuration.centres[free][:, None] - configuration.centres[free][None]
-    radii = configuration.radii[free]
-    gaps = np.linalg.norm(between, axis=2) - radii[:, None] - radii[None]
+    groups: tuple[Indices, ...] = ()
     for reach in (*_REACHES, 0.0):
-        near = gaps <= max(reach * float(configuration.radii.max()), touching)
-        labels = connected_components(near, directed=False)[1]
-        if np.bincount(labels).max() <= LARGEST_GROUP:
+        groups = linked(configuration, free, max(reach * float(configuration.radii.max()), touching))
+        if max(len(group) for group in groups) <= LARGEST_GROUP:
             break
-    return tuple(free[labels == label] for label in range(labels.max() + 1))
+    return groups
 
 
 @frozen(kw_only=True, eq=False)
@@ -180,7 +186,7 @@ class SolverCoupling:
         mean_loads: Array, guess: Array | None,
     ) -> Array | None:  # fmt: skip
         """Add g to the loads of every group; give the solver's next guess."""
-        prepared = self.problem.solver.prepare(self.plan, configuration, guess)
+        prepared = asking.prepare(self.problem.solver, self.plan, configuration, guess)
         held = np.flatnonzero(self.problem.held)
         unit = unit_load(self.problem.setting.viscosity, float(configuration.radii.max()), self.speed)
         motion = constrained_motion(self.problem.solver, prepared, mean_loads, held, unit)
@@ -193,13 +199,22 @@ class SolverCoupling:
         return motion.guess
 
 
+def contact_range(problem: Problem) -> float:
+    """Give the smooth gap (µm) below which two cells may be in contact, with room for what they move in a burst."""
+    if problem.contact is None:
+        return 0.0
+    return 1.25 * (2 * float(problem.roughness.max()) + problem.contact.gaps()[1])
+
+
 def coupler(problem: Problem, plan: Any = None) -> Coupler:
     """Give the coupler of a problem; the solver's plan is made here, once a run, unless there is one already."""
+    touching = contact_range(problem)
     if not problem.coupled:
-        return NoCoupling(problem=problem)
-    touching = 2 * float(problem.roughness.max()) + (problem.contact.gaps()[1] if problem.contact else 0.0)
-    plan = problem.solver.plan(problem.setting) if plan is None else plan
-    return SolverCoupling(problem=problem, plan=plan, speed=typical_speed(problem), touching=1.2 * touching)
+        return NoCoupling(problem=problem, touching=touching)
+    if plan is None:
+        with asking.blamed(f"solver {problem.solver.name!r}"):
+            plan = problem.solver.plan(problem.setting)
+    return SolverCoupling(problem=problem, plan=plan, speed=typical_speed(problem), touching=touching)
 
 
 def typical_speed(problem: Problem) -> float:

@@ -81,7 +81,7 @@ class Problem:
     setting: Setting
     solver: MobilitySolver
     coupled: bool  # whether the solver's coupling is used; otherwise each cell follows the exact wall functions alone
-    wall_roughness: float  # µm
+    wall_roughness: float  # µm, height of the wall's tips; minus infinity where there is no wall to touch
     species: tuple[BondSpecies, ...]
     contact: GapForce | None
     tolerances: Tolerances

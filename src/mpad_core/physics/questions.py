@@ -10,6 +10,7 @@ from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion, Setting, SolverTraits
+from mpad_core.physics import asking
 
 
 def solver(name: str, **parameters: Any) -> MobilitySolver:
@@ -30,7 +31,9 @@ def solver(name: str, **parameters: Any) -> MobilitySolver:
     return chosen
 
 
-def check_needs(traits: SolverTraits, name: str, configuration: Configuration, setting: Setting) -> None:
+def check_needs(
+    traits: SolverTraits, name: str, configuration: Configuration, setting: Setting, torques: bool = True
+) -> None:
     """Refuse, before any solve, what a solver cannot treat.
 
     Raises
@@ -43,6 +46,7 @@ def check_needs(traits: SolverTraits, name: str, configuration: Configuration, s
         "a wall": setting.wall and not traits.wall,
         "an unbounded fluid": not setting.wall and not traits.unbounded,
         "unequal radii": bool(np.ptp(radii) > 0) and not traits.unequal_radii,
+        "torques": torques and not traits.torques,
         "ambient flow": setting.shear_rate != 0 and not traits.ambient_flow,
         f"{len(radii)} cells": traits.largest_number is not None and len(radii) > traits.largest_number,
     }
@@ -51,9 +55,36 @@ def check_needs(traits: SolverTraits, name: str, configuration: Configuration, s
             raise InputError(f"solver {name!r} cannot treat {need}; see `mpad parts` for the others installed")
 
 
+def _numbers(what: str, values: Any) -> Array:
+    try:
+        return np.asarray(values, float)
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{what} must be numbers in a regular array: {error}") from error
+
+
+def _setting(viscosity: float, shear_rate: float, wall: bool) -> Setting:
+    if not (np.isfinite(viscosity) and viscosity > 0):
+        raise InputError(f"viscosity must be positive and finite, not {viscosity}")
+    if not np.isfinite(shear_rate):
+        raise InputError(f"shear_rate must be finite, not {shear_rate}")
+    return Setting(viscosity=viscosity, shear_rate=shear_rate, wall=wall)
+
+
+def _held(held: Sequence[int], n: int) -> Indices:
+    chosen = np.asarray(held)
+    if chosen.size and chosen.dtype.kind not in "iu":
+        raise InputError(f"held must list the numbers of spheres, not {held!r}")
+    if chosen.size and (chosen.min() < 0 or chosen.max() >= n):
+        raise InputError(f"held must name spheres 0 to {n - 1}, not {held!r}")
+    return np.unique(chosen.astype(np.int64))
+
+
 def _configuration(centres: Any, radii: Any, wall: bool) -> Configuration:
-    centres = np.atleast_2d(np.asarray(centres, float))
-    radii = np.broadcast_to(np.asarray(radii, float), (len(centres),))
+    centres = np.atleast_2d(_numbers("centres", centres))
+    radii = _numbers("radii", radii)
+    if radii.shape not in ((), (len(centres),)):
+        raise InputError(f"radii must be one number or one for each of the {len(centres)} spheres, not {radii.shape}")
+    radii = np.broadcast_to(radii, (len(centres),))
     if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
         raise InputError(f"centres must be (N, 3) with N at least 1, not {centres.shape}")
     if not (np.isfinite(centres).all() and np.isfinite(radii).all() and (radii > 0).all()):
@@ -90,11 +121,11 @@ def mobility_matrix(solver: MobilitySolver, centres: Any, radii: Any, *, viscosi
         For input that makes no sense, or that the solver cannot treat.
     """
     configuration = _configuration(centres, radii, wall)
-    setting = Setting(viscosity=viscosity, wall=wall)
+    setting = _setting(viscosity, 0.0, wall)
     check_needs(solver.traits, solver.name, configuration, setting)
     n = len(configuration.radii)
-    prepared = solver.prepare(solver.plan(setting), configuration)
-    return solver.solve(prepared, np.eye(6 * n).reshape(n, 6, 6 * n)).velocity.reshape(6 * n, 6 * n)
+    prepared = asking.prepare(solver, solver.plan(setting), configuration)
+    return asking.solve(solver, prepared, np.eye(6 * n).reshape(n, 6, 6 * n)).velocity.reshape(6 * n, 6 * n)
 
 
 def unit_load(viscosity: float, radius: float, speed: float) -> Array:
@@ -118,14 +149,14 @@ def constrained_motion(solver: MobilitySolver, prepared: Any, loads: Array, held
         A load typical of the problem, see `unit_load`, so that neither loads nor flow drown in the other.
     """
     if len(held) == 0:
-        return solver.solve(prepared, loads)
+        return asking.solve(solver, prepared, loads)
     n, m = len(loads), 6 * len(held)
     block = np.zeros((n, 6, m + 1))
     block[..., :] = loads[..., None]
     block[held] = 0.0
     for i, cell in enumerate(held):
         block[cell, :, 6 * i : 6 * i + 6] = np.diag(unit)
-    answer = solver.solve(prepared, block)
+    answer = asking.solve(solver, prepared, block)
     bare = answer.velocity[..., -1]
     columns = answer.velocity[..., :-1] - bare[..., None]
     constraint = np.linalg.solve(columns[held].reshape(m, m), -bare[held].ravel())
@@ -162,21 +193,20 @@ def velocities(
         As for `mobility_matrix`.
     """
     configuration = _configuration(centres, radii, wall)
-    setting = Setting(viscosity=viscosity, shear_rate=shear_rate, wall=wall)
-    check_needs(solver.traits, solver.name, configuration, setting)
+    setting = _setting(viscosity, shear_rate, wall)
     n = len(configuration.radii)
+    chosen = _held(held, n)
+    check_needs(solver.traits, solver.name, configuration, setting, torques is not None or chosen.size > 0)
     loads = np.zeros((n, 6))
     for part, given, what in ((slice(0, 3), forces, "forces"), (slice(3, 6), torques, "torques")):
         if given is not None:
-            if np.shape(given) != (n, 3):
-                raise InputError(f"{what} must be ({n}, 3), not {np.shape(given)}")
-            loads[:, part] = given
+            numbers = _numbers(what, given)
+            if numbers.shape != (n, 3):
+                raise InputError(f"{what} must be ({n}, 3), not {numbers.shape}")
+            loads[:, part] = numbers
     if not np.isfinite(loads).all():
         raise InputError("forces and torques must be finite")
-    chosen = np.unique(np.asarray(held, np.int64))
-    if chosen.size and (chosen.min() < 0 or chosen.max() >= n):
-        raise InputError(f"held must name spheres 0 to {n - 1}, not {list(held)}")
-    prepared = solver.prepare(solver.plan(setting), configuration)
+    prepared = asking.prepare(solver, solver.plan(setting), configuration)
     radius = float(configuration.radii.max())
     pushed = float(np.abs(loads[:, :3]).max() + np.abs(loads[:, 3:]).max() / radius) / (6 * np.pi * viscosity * radius)
     passed = abs(shear_rate) * float(np.abs(configuration.centres[:, 2]).max())

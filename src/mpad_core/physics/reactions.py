@@ -14,7 +14,8 @@ from numpy.polynomial.legendre import leggauss
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import PartError
-from mpad_core.numerics.tables import TableError, Tables, tabulate
+from mpad_core.numerics.tables import Tables, tabulate
+from mpad_core.physics.asking import blamed
 from mpad_core.physics.problem import BondSpecies
 
 TABLE_ERROR = 1e-6
@@ -117,17 +118,20 @@ class BondLaw:
         PartError
             If a table cannot follow the model.
         """
+        with blamed(f"bond model {self.species.model.name!r} of bond {self.species.name!r}"):
+            return self._tabulated()
+
+    def _tabulated(self) -> Tables:
         nearest, reach = self.binding_lengths()
 
         def on_rate(length: Array) -> Array:
             within = (length >= nearest) & (length <= reach)
             return np.where(within, self.on_rate(np.clip(length, nearest, reach)), 0.0)
 
-        try:
-            return tabulate([self.tension, self.off_rate, on_rate], self.edges(), error=TABLE_ERROR, tangents=[0])
-        except TableError as error:
-            name = self.species.model.name
-            raise PartError(f"bond {self.species.name!r}: model {name!r} cannot be tabulated: {error}") from error
+        tables = tabulate([self.tension, self.off_rate, on_rate], self.edges(), error=TABLE_ERROR, tangents=[0])
+        if (tables.coefficients[:, 1:, 0] < 0).any():
+            raise PartError(f"bond model {self.species.model.name!r} of bond {self.species.name!r} has a negative rate")
+        return tables
 
 
 @frozen(kw_only=True, eq=False)

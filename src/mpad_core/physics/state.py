@@ -69,9 +69,45 @@ def to_arrays(state: State) -> dict[str, Any]:
     return arrays if state.guess is None else arrays | {"guess": state.guess}
 
 
-def from_arrays(arrays: Mapping[str, Any]) -> State:
-    """Make the state of a checkpoint's arrays; the inverse of `to_arrays`."""
+_SHAPES: dict[str, tuple[int, ...]] = {
+    "centres": (3,),
+    "wall_gaps": (),
+    "orientations": (4,),
+    "velocities": (6,),
+    "drift": (6,),
+    "mean_loads": (6,),
+    "bound_since": (),
+    "bound_at": (),
+    "caught_since": (),
+}
+
+
+def _check(state: State, cells: int, sites: int) -> None:
+    for name, shape in _SHAPES.items():
+        found = getattr(state, name)
+        if found.shape != (cells, *shape) or found.dtype != np.float64:
+            raise ValueError(f"{name} is {found.dtype} of shape {found.shape}")
+    bonds = state.bonds
+    count = bonds.cell.shape[0] if bonds.cell.ndim else -1
+    for name in ("cell", "site", "species", "ligand"):
+        found = getattr(bonds, name)
+        if found.shape != (count,) or found.dtype.kind != "i":
+            raise ValueError(f"bonds' {name} is {found.dtype} of shape {found.shape}")
+    if bonds.anchor.shape != (count, 3) or (count and (bonds.cell.max() >= cells or bonds.site.max() >= sites)):
+        raise ValueError("bonds hold cells or sites that are not there")
+
+
+def from_arrays(arrays: Mapping[str, Any], cells: int, sites: int) -> State:
+    """Make the state of a checkpoint's arrays; the inverse of `to_arrays`.
+
+    Raises
+    ------
+    ValueError, TypeError, KeyError
+        If the arrays are not a state of so many cells with so many sites in all.
+    """
     own = {name.removeprefix("state."): value for name, value in arrays.items() if name.startswith("state.")}
     whole = {name: own.pop(name).item() for name in ("step", "zero", "time")}
     bonds = BondList(**{n.removeprefix("bonds."): v for n, v in arrays.items() if n.startswith("bonds.")})
-    return State(**whole, **own, bonds=bonds, guess=arrays.get("guess"))
+    state = State(**whole, **own, bonds=bonds, guess=arrays.get("guess"))
+    _check(state, cells, sites)
+    return state

@@ -97,10 +97,10 @@ def _offered(part: InstalledPart) -> list[Any]:
         manager.load_setuptools_entrypoints(GROUP, name=f"{part.kind}.{part.name}")
         manager.check_pending()
         return [item for offer in getattr(manager.hook, KINDS[part.kind].hook)() for item in offer]
-    except Exception as error:  # a stranger's module may raise anything
+    except (Exception, SystemExit) as error:  # a stranger's module may raise anything, or try to leave
         raise PartError(
             f"{part.kind} {part.name!r} of {part.distribution} {part.version} failed to load: "
-            f"{type(error).__name__}: {error}"
+            f"{type(error).__name__}: {' '.join(str(error).split())}"
         ) from error
 
 

@@ -4,13 +4,16 @@ import numpy as np
 from attrs import frozen
 
 from mpad_core.arrays import Array, Indices
+from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.numerics.streams import key_of
 from mpad_core.numerics.tables import Tables, no_tables, tabulate, together
+from mpad_core.physics.asking import blamed
 from mpad_core.physics.coupling import NOT_FELT, Coupling
 from mpad_core.physics.molecules import identity_of, place_sites
-from mpad_core.physics.problem import Problem
+from mpad_core.physics.problem import BondSpecies, Problem
 from mpad_core.physics.state import BondList, State
 from mpad_core.running.layout import Bodies, Bonds, Contacts, Groups, Molecules, Motion, Species, System
+from mpad_core.running.reacting import MOST_LIGANDS, SQUARE
 
 _FORCE_ERROR = 1e-6  # relative, of the tabulated repulsion
 
@@ -35,6 +38,8 @@ def _species(problem: Problem) -> Species:
         return Species(no_tables(3), np.zeros(0, np.int64), empty, empty, np.zeros(0, np.uint8), empty)
     from mpad_core.physics.reactions import BondLaw
 
+    for species in problem.species:
+        _check_crowding(species)
     laws = [BondLaw(species=species) for species in problem.species]
     # in the reading "overlap" a bond that would push if it stood upright is born unstressed, hence tilted
     tilted = [s.reach == "overlap" and s.compression == "linear" for s in problem.species]
@@ -48,11 +53,26 @@ def _species(problem: Problem) -> Species:
     )
 
 
+def _check_crowding(species: BondSpecies) -> None:
+    """Refuse a density that is none, and one that cannot be laid out molecule by molecule."""
+    with blamed(f"surface {species.surface.name!r}"):
+        densest = float(species.surface.densest())
+    if not (np.isfinite(densest) and densest >= 0):
+        raise PartError(f"surface {species.surface.name!r} of bond {species.name!r}: densest() is {densest}")
+    if species.reach == "pairs" and densest * SQUARE**2 > MOST_LIGANDS / 1.5:
+        most = MOST_LIGANDS / 1.5 / SQUARE**2
+        raise InputError(f'bond {species.name!r}: reach "pairs" lays out at most {most:g} sites/um^2, not {densest:g}')
+
+
 def _contact(problem: Problem) -> tuple[Tables, float]:
     if problem.contact is None:
         return no_tables(1), -np.inf
-    low, high = problem.contact.gaps()
-    law = tabulate([problem.contact.force], [low, high], error=_FORCE_ERROR, tangents=[0])
+    who = f"force law {problem.contact.name!r}"
+    with blamed(who):
+        low, high = problem.contact.gaps()
+        if not (np.isfinite([low, high]).all() and low < high):
+            raise PartError(f"{who}: gaps() gives {low} and {high}, not a smaller and a larger gap")
+        law = tabulate([problem.contact.force], [low, high], error=_FORCE_ERROR, tangents=[0])
     law.coefficients[-1] = 0.0  # nothing beyond the largest gap
     return law, high
 
@@ -91,7 +111,11 @@ def local_density(problem: Problem, fixed: Fixed, centres: Array) -> Array:
     for k, species in enumerate(problem.species):
         most = species.surface.densest()
         reference = most if species.reach == "pairs" and most > 0 else fixed.reference_density[k]
-        ratio[:, k] = species.surface.density(centres[:, 0], centres[:, 1]) / reference
+        with blamed(f"surface {species.surface.name!r}"):
+            density = np.asarray(species.surface.density(centres[:, 0], centres[:, 1]), float)
+        if density.shape != (len(centres),) or not ((density >= 0) & (density <= most * (1 + 1e-9))).all():
+            raise PartError(f"surface {species.surface.name!r}: densities must lie from 0 to its densest(), {most:g}")
+        ratio[:, k] = density / reference
     return ratio
 
 

@@ -93,8 +93,9 @@ def _move_group(
 
 
 @compiled
-def _must_end(motion: Motion, start: Array, limits: Limits) -> bool:
+def _must_end(motion: Motion, limits: Limits) -> bool:
     """Tell whether the frozen coupling has been used far enough."""
+    start = limits.start
     for cell in range(start.shape[0]):
         if motion.gap[cell] < limits.gap_low[cell] or motion.gap[cell] > limits.gap_high[cell]:
             return True
@@ -146,7 +147,6 @@ def burst(
     )  # fmt: skip
     room = bonds.cell.shape[0]
     attached = Attached(np.zeros(cells + 1, np.int64), np.zeros(room, np.int64), np.empty((room, 3)))
-    start = motion.centre.copy()
     groups = system.groups.first.shape[0] - 1
     dt = limits.sub_step
     for done in range(limits.most):
@@ -169,6 +169,6 @@ def burst(
             outcome = _move_group(group, dt, system, bonds, attached, motion, turns)
             if outcome != REACHED:
                 return outcome, done, group
-        if _must_end(motion, start, limits):
+        if _must_end(motion, limits):
             return REACHED, done + 1, -1
     return REACHED, limits.most, -1

@@ -47,5 +47,5 @@ def _bond_counts(before: State, after: State, time: float) -> Any:
 
 def frames(problem: Problem, hazards: Hazards, schedule: Schedule, before: State, after: State) -> Iterator[Frame]:
     """Yield the frames that are due between two states."""
-    for share in schedule.due(before, after):
+    for share in schedule.due(problem, before, after):
         yield frame_of(problem, hazards, before, after, share)

@@ -108,6 +108,7 @@ class Limits(NamedTuple):
 
     sub_step: float  # s
     most: int  # sub-steps
+    start: Array  # (N, 3) µm, centres when the coupling was frozen
     pairs: Indices  # (P, 2)
     pair_move: Array  # (P,) µm, relative displacement allowed
     gap_low: Array  # (N,) µm, bounds within which the frozen coupling may be combined with r(h)

@@ -15,7 +15,7 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import BOND_EVENT, Configuration
 from mpad_core.numerics.tables import value
-from mpad_core.physics.coupling import Coupler, Coupling, coupler, lone_cell
+from mpad_core.physics.coupling import Coupler, Coupling, contact_range, coupler, lone_cell
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State
 from mpad_core.running import assembly, pace
@@ -97,20 +97,15 @@ def step(machine: Machine, state: State, until: float) -> State:
 
 def _coupled_pairs(machine: Machine, state: State) -> Any:
     """List the pairs whose relative motion bounds a burst: all that are coupled, or could touch."""
-    reach = np.inf if machine.problem.coupled else _contact_range(machine)
-    return assembly.near_pairs(machine.problem, state.centres, reach)
-
-
-def _contact_range(machine: Machine) -> float:
-    """Give the smooth gap (µm) within which two cells may touch, with room for what they move in a burst."""
-    rough = 2 * float(machine.problem.roughness.max())
-    return 1.25 * max(rough + machine.fixed.contact_reach, 0.0)
+    problem = machine.problem
+    bounding = problem.coupled or problem.contact is not None
+    return assembly.near_pairs(problem, state.centres, np.inf if bounding else -np.inf)
 
 
 def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits) -> State:
     """Run the burst, with as much room for bonds and events as it needs; make the next state of its outcome."""
     problem, fixed = machine.problem, machine.fixed
-    data = assembly.system(problem, fixed, state, coupling, _contact_range(machine))
+    data = assembly.system(problem, fixed, state, coupling, contact_range(problem))
     motion = assembly.motion_of(state)
     bound = np.zeros(len(fixed.molecules.kind), np.uint8)
     bound[state.bonds.site] = 1
@@ -139,7 +134,9 @@ def _refuse(machine: Machine, state: State, coupling: Coupling, outcome: int, gr
     cells = coupling.groups[group]
     where = ", ".join(f"{problem.names[i]} (gap to the wall {state.wall_gaps[i]:.4g} um)" for i in cells)
     what = "no sub-step balances the loads" if outcome == NO_BALANCE else "resistance is not positive definite"
-    raise RefusedError(f"step {state.step}, t = {state.time:.6g} s: {what} for {where}; solver {problem.solver.name!r}")
+    raise RefusedError(
+        f"step {state.step - state.zero}, t = {state.time:.6g} s: {what} for {where}; solver {problem.solver.name!r}"
+    )
 
 
 def _next(

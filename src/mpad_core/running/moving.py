@@ -223,7 +223,8 @@ def _largest_move(change: Array, dt: float, radii: Array) -> float:
     largest = 0.0
     for i in range(change.shape[0]):
         lever = 1.0 if i % 6 < 3 else radii[i // 6]
-        largest = max(largest, abs(change[i]) * dt * lever)
+        if not abs(change[i]) * dt * lever <= largest:  # so that a NaN counts as large
+            largest = abs(change[i]) * dt * lever
     return largest
 
 

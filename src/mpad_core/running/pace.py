@@ -4,9 +4,12 @@ import numpy as np
 from attrs import frozen
 
 from mpad_core.arrays import Array, Indices
+from mpad_core.numerics.tables import value
+from mpad_core.physics.coupling import contact_range
 from mpad_core.physics.problem import Problem
 from mpad_core.running.assembly import Fixed
 from mpad_core.running.layout import Limits
+from mpad_core.running.reacting import OFF_RATE, ON_RATE
 
 _MOST_SUB_STEPS = 1000  # in one burst, so that a run can be told to stop
 _GAP_CHANGE = 0.2  # of a cell's gap to the wall over which the frozen coupling may be combined with r(h)
@@ -27,15 +30,12 @@ def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
     """Choose the steps from the accuracies asked for.
 
     A test of P = 1 − exp(−k Δt) a sub-step delays events by Δt/2, a relative error k Δt/2 of their rate: the largest
-    on-rate bounds the sub-step. Backward Euler errs by Δt/2 times the change of the velocity; the height must stay
-    within ``position``. The coupling is taken in the middle of a burst, so its error grows with η².
+    on-rate and the unstressed off-rates bound the sub-step. Backward Euler errs by Δt/2 times the change of the
+    velocity; the height must stay within ``position``. The coupling is taken in the middle of a burst, so its error grows with η².
     """
     tolerances = problem.tolerances
     bounds = [_LARGEST_SUB_STEP]
-    rates = fixed.species.tables.coefficients[:, 2, 0]
-    if rates.size and rates.max() > 0:
-        densest = max(s.surface.densest() / s.at_density if s.reach != "pairs" else 1.0 for s in problem.species)
-        bounds.append(2 * tolerances.rate / (float(rates.max()) * max(densest, 1e-12)))
+    bounds += [2 * tolerances.rate / rate for rate in _fastest(problem, fixed) if rate > 0]
     settling = np.abs(problem.external[:, :3]).max() / (6 * np.pi * problem.setting.viscosity * problem.radii.min())
     vertical = _VERTICAL * abs(problem.setting.shear_rate) * float(problem.radii.max()) + float(settling)
     if vertical > 0:
@@ -47,12 +47,29 @@ def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
     return Pace(sub_step=sub_step, longest=longest, share=share)
 
 
+def _fastest(problem: Problem, fixed: Fixed) -> list[float]:
+    """Give the rates (1/s) that events have in an unstressed bond, or in one about to form, for every species."""
+    rates = []
+    for k, species in enumerate(problem.species):
+        lengths = np.linspace(0.0, float(fixed.species.reach[k]), 201)
+        crowded = 1.0 if species.reach == "pairs" else species.surface.densest() / species.at_density
+        rates.append(crowded * max(value(fixed.species.tables, k, ON_RATE, x) for x in lengths))
+        rates.append(value(fixed.species.tables, k, OFF_RATE, species.rest_length))
+    return rates
+
+
 def moves(problem: Problem, pairs: Indices, centres: Array, share: float) -> Array:
-    """Give how far each pair (P,) may move relative to each other: a share of its gap (µm)."""
+    """Give how far each pair (P,) may move relative to each other (µm): a share of its gap.
+
+    Where nothing but contact couples them, it is less than half the way to where they could touch.
+    """
     i, j = pairs[:, 0], pairs[:, 1]
     gaps = np.linalg.norm(centres[i] - centres[j], axis=1) - problem.radii[i] - problem.radii[j]
     allowed: Array = share * np.maximum(gaps, 1e-3 * np.minimum(problem.radii[i], problem.radii[j]))
-    return allowed
+    if problem.coupled:
+        return allowed
+    apart: Array = np.maximum(allowed, 0.4 * (gaps - contact_range(problem) / 1.25))
+    return apart
 
 
 def expected_length(problem: Problem, pairs: Indices, pace: Pace, centres: Array, drift: Array) -> float:
@@ -61,14 +78,17 @@ def expected_length(problem: Problem, pairs: Indices, pace: Pace, centres: Array
         return pace.longest
     speeds = np.linalg.norm(drift[pairs[:, 0], :3] - drift[pairs[:, 1], :3], axis=1)
     times = moves(problem, pairs, centres, pace.share) / np.maximum(speeds, 1e-300)
-    return float(min(pace.longest, times.min()))
+    # a burst ends with the first whole sub-step that passes a limit
+    whole = max(np.ceil(min(pace.longest, times.min()) / pace.sub_step * (1 - 1e-9)), 1.0)
+    return float(whole * pace.sub_step)
 
 
 def limits(problem: Problem, pairs: Indices, pace: Pace, centres: Array, middle_gaps: Array, left: float) -> Limits:
     """Give the limits of a burst whose coupling was taken at `middle_gaps`; `left` (s) is the time to the run's end."""
     wanted = min(pace.longest, left)
     most = int(np.clip(np.ceil(wanted / pace.sub_step * (1 - 1e-9)), 1, _MOST_SUB_STEPS))
+    most = min(most, max(round(left / pace.sub_step), 1))  # the run ends at the sub-step nearest to its end
     free = problem.setting.wall & problem.coupled
     low = middle_gaps * (1 - _GAP_CHANGE) if free else np.full(len(middle_gaps), -np.inf)
     high = middle_gaps * (1 + _GAP_CHANGE) if free else np.full(len(middle_gaps), np.inf)
-    return Limits(pace.sub_step, most, pairs, moves(problem, pairs, centres, pace.share), low, high)
+    return Limits(pace.sub_step, most, centres, pairs, moves(problem, pairs, centres, pace.share), low, high)

@@ -21,7 +21,7 @@ _LIGANDS = int(Stream.LIGANDS)
 _ANCHORS = int(Stream.ANCHORS)
 TENSION, OFF_RATE, ON_RATE = 0, 1, 2  # columns of the bond tables
 SQUARE = 0.1  # µm, side of the squares in which the wall's molecules are laid out
-_MOST_LIGANDS = 255  # in a square; each has a number of 8 bits
+MOST_LIGANDS = 255  # in a square; each has a number of 8 bits
 
 
 @compiled
@@ -151,7 +151,7 @@ def ligands_of(key: int, kind: int, i: int, j: int, density: float) -> int:
     chance = math.exp(-density * SQUARE * SQUARE)
     total = chance
     number = 0
-    while u > total and number < _MOST_LIGANDS:
+    while u > total and number < MOST_LIGANDS:
         number += 1
         chance *= density * SQUARE * SQUARE / number
         total += chance

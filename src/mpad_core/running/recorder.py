@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, fields, frozen
 
+from mpad_core.interfaces.errors import InputError, MpadError, PartError
 from mpad_core.interfaces.observer import Frame, Observer
 from mpad_core.interfaces.values import BOND_EVENT
+from mpad_core.physics.asking import blamed
 from mpad_core.physics.measures import Hazards, hazards
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State, to_arrays
@@ -62,7 +64,8 @@ class Recorder:
 
     def record(self, frame: Frame) -> None:
         """Append one frame with what the observers see in it."""
-        self.writer.append(frame, [value for observer in self.recording.observers for value in observer.see(frame)])
+        seen = [value for observer in self.recording.observers for value in _seen(observer, frame)]
+        self.writer.append(frame, seen)
 
     def finish(self, state: State) -> None:
         """Record the last state, unless it has just been recorded."""
@@ -82,19 +85,45 @@ class Recorder:
         write_checkpoint(self.directory / CHECKPOINT, arrays | rows)
 
 
+def _seen(observer: Observer, frame: Frame) -> list[Any]:
+    """Give what an observer sees in a copy of the frame, checked against the fields that it declared."""
+    arrays = {f.name: getattr(frame, f.name).copy() for f in fields(Frame) if f.name not in ("step", "time", "cells")}
+    who = f"observer {observer.name!r}"
+    with blamed(who):
+        values = [np.asarray(value) for value in observer.see(evolve(frame, **arrays))]
+        declared = [tuple(field.shape) for field in observer.fields(frame.cells)]
+    shapes = [value.shape for value in values]
+    if shapes != declared:
+        raise PartError(f"{who} gave values of shapes {shapes} where it declared {declared}")
+    return values
+
+
+def close_observers(observers: Sequence[Observer]) -> None:
+    """Tell every observer that the run has ended; the first that fails is named once all have been told."""
+    faults = []
+    for observer in observers:
+        try:
+            with blamed(f"observer {observer.name!r}"):
+                observer.close()
+        except MpadError as error:
+            faults.append(error)
+    if faults:
+        raise faults[0]
+
+
 def begin_recording(recording: Recording, machine: Machine, directory: Path, state: State) -> Recorder:
     """Make the trajectory, with the frame of time zero in it, and the first checkpoint."""
     problem = machine.problem
     path = directory / TRAJECTORY
     path.unlink(missing_ok=True)  # left by a process that died before its first checkpoint
-    fields = [declared for observer in recording.observers for declared in observer.fields(problem.names)]
+    declared = [field for observer in recording.observers for field in observer.fields(problem.names)]
     recorder = Recorder(
         problem=problem,
         recording=recording,
         directory=directory,
         hazards=hazards(problem),
-        schedule=Schedule.starting(recording.cadence, state),
-        writer=TrajectoryWriter.create(path, _header(recording, problem), fields),
+        schedule=Schedule.starting(recording.cadence, problem, state),
+        writer=TrajectoryWriter.create(path, _header(recording, problem), declared),
     )
     recorder.record(frame_of(problem, recorder.hazards, state, state, 1.0))
     recorder.writer.append_events(_bonds_at_zero(machine, state))
@@ -105,14 +134,18 @@ def begin_recording(recording: Recording, machine: Machine, directory: Path, sta
 
 def go_on_recording(recording: Recording, problem: Problem, directory: Path, kept: Mapping[str, Any]) -> Recorder:
     """Go on with a trajectory from the rows that the checkpoint counts."""
-    rows = {name.removeprefix("rows."): int(count) for name, count in kept.items() if name.startswith("rows.")}
+    rows = {name.removeprefix("rows."): count for name, count in kept.items() if name.startswith("rows.")}
+    if "frames" not in rows or any(count.shape != () or count.dtype.kind not in "iu" for count in rows.values()):
+        raise InputError(
+            f"{directory / CHECKPOINT}: does not count the trajectory's rows; start anew elsewhere with -o"
+        )
     return Recorder(
         problem=problem,
         recording=recording,
         directory=directory,
         hazards=hazards(problem),
         schedule=Schedule.remembering(recording.cadence, kept),
-        writer=TrajectoryWriter.resume(directory / TRAJECTORY, rows),
+        writer=TrajectoryWriter.resume(directory / TRAJECTORY, {name: int(count) for name, count in rows.items()}),
     )
 
 

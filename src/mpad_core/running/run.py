@@ -7,7 +7,8 @@ from pathlib import Path
 
 from attrs import field, frozen
 
-from mpad_core.interfaces.errors import InputError, InterruptedRunError, MpadError, PartError
+from mpad_core.interfaces.errors import InputError, InterruptedRunError, MpadError, PartError, RefusedError
+from mpad_core.physics.asking import one_line
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State, from_arrays
 from mpad_core.records.checkpoint import read_checkpoint
@@ -22,6 +23,7 @@ from mpad_core.running.recorder import (
     Recorder,
     Recording,
     begin_recording,
+    close_observers,
     go_on_recording,
 )
 from mpad_core.running.stopping import Signals, StopWhen, first_that_holds, listening
@@ -68,9 +70,10 @@ def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Pr
     """
     directory.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
-    with listening() as signals, _named_parts(order.problem, "before step one"):
-        machine = make_ready(order.problem)
-        recorder, state, ended = _begin(order, machine, directory, resume, signals, log)
+    with listening() as signals:
+        with _named_parts(order.problem, "before step one"):
+            machine = make_ready(order.problem)
+            recorder, state, ended = _begin(order, machine, directory, resume, signals, log)
         prepared = time.monotonic()
         with _closed(recorder):
             state, ended, steps = _go_on(order, machine, recorder, state, ended, signals, bar)
@@ -85,15 +88,17 @@ def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Pr
 
 
 @contextmanager
-def _named_parts(problem: Problem, when: str) -> Iterator[None]:
-    """Turn whatever a plugin raises into a PartError that names the parts and the moment."""
+def _named_parts(problem: Problem, when: str, remedy: str = "") -> Iterator[None]:
+    """Add the moment to what a part raises, and what would do; an error that names no part gets all their names."""
     try:
         yield
+    except (PartError, RefusedError) as error:
+        raise type(error)(f"{error}; {when}{remedy}") from error
     except MpadError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         names = [problem.solver.name, *(s.model.name for s in problem.species)]
-        what = f"a part failed {when} (parts: {', '.join(names)}): {type(error).__name__}: {error}"
+        what = f"a part failed (parts: {', '.join(names)}): {one_line(error)}; {when}{remedy}"
         raise PartError(what) from error
 
 
@@ -110,8 +115,7 @@ def _closed(recorder: Recorder) -> Iterator[None]:
             recorder.writer.abandon()
         raise
     finally:
-        for observer in recorder.recording.observers:
-            observer.close()
+        close_observers(recorder.recording.observers)
 
 
 def _begin(
@@ -126,11 +130,15 @@ def _begin(
         state = _prepared(machine, signals)
         return begin_recording(order.recording, machine, directory, state), state, ""
     kept = read_checkpoint(checkpoint)
-    state = from_arrays(kept)
-    if len(state.wall_gaps) != len(order.problem.names):
-        raise InputError(f"{checkpoint}: holds {len(state.wall_gaps)} cells, the scene {len(order.problem.names)}")
+    try:
+        state = from_arrays(kept, len(order.problem.names), len(machine.fixed.molecules.kind))
+        ended = kept["ended"]
+        if ended.shape != () or ended.dtype.kind != "U":
+            raise ValueError("why the run ended is no text")
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise InputError(f"{checkpoint}: does not fit the scene ({one_line(error)}); start anew with -o") from error
     log.write("resumed", run=directory.name, simulated=state.time)
-    return go_on_recording(order.recording, order.problem, directory, kept), state, str(kept["ended"])
+    return go_on_recording(order.recording, order.problem, directory, kept), state, str(ended)
 
 
 def _prepared(machine: Machine, signals: Signals) -> State:
@@ -153,15 +161,16 @@ def _go_on(
     marching = march(machine, state, order.until)
     next(marching)
     while not ended:
-        with _named_parts(order.problem, f"at t = {before.time:.6g} s, step {before.step - before.zero}"):
+        now = f"at t = {before.time:.6g} s, step {before.step - before.zero}"
+        with _named_parts(order.problem, now, "; go on with --resume"):
             after = next(marching, None)
-        if after is None:
-            break
-        try:
-            recorder.hear(before, after)
-        except NearlyFullError:
-            recorder.keep(after)
-            raise
+            if after is None:
+                break
+            try:
+                recorder.hear(before, after)
+            except NearlyFullError:
+                recorder.keep(after)
+                raise
         before, steps = after, steps + 1
         bar.update(after.time, after.step - after.zero)
         ended = first_that_holds(order.stop_when, order.problem, after) or ""

@@ -69,7 +69,7 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         setting=setting,
         solver=solver,
         coupled=effects["coupling"].on,
-        wall_roughness=scene.wall.roughness if scene.wall else 0.0,
+        wall_roughness=scene.wall.roughness if scene.wall else -np.inf,
         species=species,
         contact=scene.repulsion.instance if scene.repulsion and effects["repulsion"].on else None,
         tolerances=Tolerances(position=scene.accuracy.position, rate=scene.accuracy.rate),

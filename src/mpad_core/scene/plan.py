@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from mpad_core.physics.asking import blamed
 from mpad_core.plugins.registry import find
 from mpad_core.scene.compose import compose
 from mpad_core.scene.groups import dimensionless_groups
@@ -33,7 +34,9 @@ def plan_lines(scene: Scene) -> Iterator[str]:
         yield f"  {effect.name:<12} {'on ' if effect.on else 'off'}  {effect.why}"
     yield "groups:"
     kT = thermal_energy(scene.fluid.temperature)
-    for group in dimensionless_groups(problem, scene.fluid.density, kT, scene.stop.time):
+    with blamed(f"a bond model ({', '.join(s.model.name for s in problem.species)})"):
+        groups = dimensionless_groups(problem, scene.fluid.density, kT, scene.stop.time)
+    for group in groups:
         yield f"  {group.name:<12} {group.value:<10.3g}{group.meaning}"
 
 

@@ -95,7 +95,7 @@ def run(
     root = FilePath(directory)
     text = resolved_toml(scene)
     todo = list(cases(scene))
-    root.mkdir(parents=True, exist_ok=True)
+    _make(root)
     with locked(root):
         _claim(root, text, resume)
         with RunLog(root / LOG) as log:
@@ -110,6 +110,15 @@ def run(
     return summary
 
 
+def _make(root: FilePath) -> None:
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{root}: no directory can be made there ({error.strerror}); choose another with -o"
+        ) from error
+
+
 def _claim(root: FilePath, text: str, resume: bool) -> None:
     """Make the directory this scene's, or see that it is."""
     there = root / SCENE
@@ -119,7 +128,7 @@ def _claim(root: FilePath, text: str, resume: bool) -> None:
         _write_whole(there, text)
     elif not resume:
         raise InputError(f"{root}: holds a run already; add --resume to go on with it, or choose another with -o")
-    elif there.read_text() != text:
+    elif there.read_bytes() != text.encode():
         raise InputError(f"{there}: is of another scene or of other settings; --resume needs the very same scene")
 
 
