@@ -51,8 +51,13 @@ def until(condition, seconds=200.0):
 
 def content(path):
     found = {}
+
+    def take(name, item):
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[()]
+
     with h5py.File(path, "r") as file:
-        file.visititems(lambda name, item: found.__setitem__(name, item[()]) if isinstance(item, h5py.Dataset) else None)
+        file.visititems(take)
     return found
 
 
@@ -144,7 +149,9 @@ class TestWell:
 
     def test_set_reaches_the_run(self, finished):
         directory, _ = finished
-        assert json.loads((directory / "summary.json").read_text())["runs"][0]["time_s"] == pytest.approx(2e-3, rel=0.02)
+        assert json.loads((directory / "summary.json").read_text())["runs"][0]["time_s"] == pytest.approx(
+            2e-3, rel=0.02
+        )
 
     def test_the_resolved_scene_gives_the_same_run(self, finished, mpad, tmp_path):
         directory, _ = finished

@@ -55,10 +55,10 @@ def imported(*words):
     return set(json.loads(done.stderr.splitlines()[-1]))
 
 
-def best_of(times, *words):
-    """Give the shortest time (s) that a command takes, over some tries."""
+def best_of(times, budget, *words):
+    """Give the shortest time (s) that a command takes, over some tries, or the first within the budget."""
     taken = []
-    for _ in range(times):
+    while len(taken) < times and min(taken, default=budget) >= budget:
         began = time.perf_counter()
         subprocess.run([sys.executable, "-m", "mpad_core", *map(str, words)], capture_output=True, check=True)
         taken.append(time.perf_counter() - began)
@@ -79,7 +79,7 @@ def scene(tmp_path):
                                                (("parts",), 1.5), (("check",), 1.5)])  # fmt: skip
 def test_time_to_start(words, budget, scene):
     words = (*words, scene("all")) if words == ("check",) else words
-    taken = best_of(5, *words)
+    taken = best_of(5, budget, *words)
     print(f"mpad {words[0]}: {taken:.2f} s")
     assert taken < budget
 

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 import tokenize
@@ -44,8 +45,9 @@ def test_the_test_is_short() -> None:
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Make an environment outside the workspace that holds the core, three plugins and the tutorial's package."""
     home = tmp_path_factory.mktemp("stranger")
+    shutil.copytree(TUTORIAL, home / "package", ignore=shutil.ignore_patterns("__pycache__", ".*"))
     subprocess.run([sys.executable, "-m", "venv", home / "venv"], check=True, timeout=120)
-    packages = [f"{ROOT}[testing]", *(str(ROOT / "plugins" / name) for name in NEEDED), str(TUTORIAL)]
+    packages = [f"{ROOT}[testing]", *(str(ROOT / "plugins" / name) for name in NEEDED), str(home / "package")]
     done = run(home, "python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *packages)
     assert done.returncode == 0, done.stderr[-3000:]
     return home
@@ -68,7 +70,7 @@ def test_parts_lists_it(environment: Path) -> None:
 
 
 def test_its_scene_is_checked_and_runs(environment: Path) -> None:
-    scene = str(TUTORIAL / "rolling.toml")
+    scene = str(environment / "package" / "rolling.toml")
     checked = run(environment, "mpad", "check", scene)
     assert checked.returncode == 0, checked.stderr
     assert "bond tether: dembo-spring (mpad-dembo-spring 0.1.0)" in checked.stdout
@@ -80,7 +82,16 @@ def test_its_scene_is_checked_and_runs(environment: Path) -> None:
 
 def test_its_own_test_passes(environment: Path) -> None:
     done = run(
-        environment, "python", "-m", "pytest", "-q", "-W", "error", "-p", "no:cacheprovider", str(TUTORIAL / "tests")
+        environment,
+        "python",
+        "-m",
+        "pytest",
+        "-q",
+        "-W",
+        "error",
+        "-p",
+        "no:cacheprovider",
+        str(environment / "package"),
     )
     assert done.returncode == 0, done.stdout[-3000:]
     assert " passed" in done.stdout

@@ -28,7 +28,7 @@ def test_arrays_hold_the_state(guess: Any) -> None:
     state = made(guess=guess)
     arrays = to_arrays(state)
     assert all(isinstance(value, np.ndarray) for value in arrays.values())
-    back = from_arrays(arrays)
+    back = from_arrays(arrays, 2, 10)
     for name in ("centres", "wall_gaps", "orientations", "velocities", "drift", "mean_loads", "bound_since"):
         assert np.array_equal(getattr(back, name), getattr(state, name))
     for name in ("bound_at", "caught_since"):
@@ -42,7 +42,7 @@ def test_arrays_hold_the_state(guess: Any) -> None:
 def test_other_arrays_are_passed_over() -> None:
     """A checkpoint holds more than the state."""
     arrays = to_arrays(made()) | {"schedule.last_time": np.array(1.0), "ended": np.array("")}
-    assert from_arrays(arrays).step == 1 << 40
+    assert from_arrays(arrays, 2, 10).step == 1 << 40
 
 
 def test_bond_counts() -> None:

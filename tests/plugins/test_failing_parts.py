@@ -114,8 +114,13 @@ def scene(tmp_path, distribution):
 
 def content(path):
     found = {}
+
+    def take(name, item):
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[()]
+
     with h5py.File(path, "r") as file:
-        file.visititems(lambda name, item: found.__setitem__(name, item[()]) if isinstance(item, h5py.Dataset) else None)
+        file.visititems(take)
     return found
 
 
@@ -168,7 +173,7 @@ def test_a_solver_that_fails_from_the_start_says_so(scene, mpad, tmp_path, monke
     assert "fickle" in err
 
 
-OBSERVER = '''\
+OBSERVER = """\
 import os
 from typing import ClassVar
 from attrs import frozen
@@ -191,7 +196,7 @@ class Nosy:
 
 @hookimpl
 def mpad_observers(): return [Nosy]
-'''
+"""
 
 
 @pytest.mark.parametrize("fault", ["raises", "too many", "wrong shape", "none"])
@@ -236,7 +241,7 @@ def test_an_observer_that_writes_to_the_frame_changes_no_run(scene, distribution
         assert "nosy" in err
 
 
-LAWS = '''\
+LAWS = """\
 from typing import ClassVar
 import numpy as np
 from attrs import frozen
@@ -294,7 +299,7 @@ def mpad_bond_models(): return [Odd]
 def mpad_force_laws(): return [Push]
 @hookimpl
 def mpad_surfaces(): return [Bare]
-'''
+"""
 BINDING = """\
 solver = "isolated"
 stop = { time = "2 ms" }

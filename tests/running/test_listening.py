@@ -25,7 +25,7 @@ def passed(lab: Any) -> tuple[Any, list[Any]]:
 
 
 def recorded(machine: Any, marched: list[Any], **cadence: Any) -> list[Any]:
-    schedule = Schedule.starting(Cadence(**cadence), marched[0])
+    schedule = Schedule.starting(Cadence(**cadence), machine.problem, marched[0])
     felt = hazards(machine.problem)
     return [
         frame for before, after in pairwise(marched) for frame in frames(machine.problem, felt, schedule, before, after)
@@ -89,7 +89,7 @@ def test_a_schedule_goes_on_from_what_it_kept(passed: Any) -> None:
     machine, marched = passed
     cadence, felt = Cadence(time=0.0007, dx=0.4), hazards(machine.problem)
     whole = [frame.time for frame in recorded(machine, marched, time=0.0007, dx=0.4)]
-    schedule, found = Schedule.starting(cadence, marched[0]), []
+    schedule, found = Schedule.starting(cadence, machine.problem, marched[0]), []
     for before, after in pairwise(marched):
         schedule = Schedule.remembering(cadence, schedule.memory())
         found += [frame.time for frame in frames(machine.problem, felt, schedule, before, after)]

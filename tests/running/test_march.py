@@ -213,7 +213,7 @@ def test_a_state_goes_through_arrays_and_on(lab: Any, same: Any) -> None:
     middle = len(whole) // 2
     stored = {name: np.array(value) for name, value in to_arrays(whole[middle]).items()}
     again = lab.machine(cells, solver="rpb", **ROLLING)
-    rest = lab.states(again, 0.02, from_arrays(stored))
+    rest = lab.states(again, 0.02, from_arrays(stored, 2, len(again.fixed.molecules.kind)))
     assert len(rest) == len(whole) - middle
     assert all(same(a, b) for a, b in zip(rest, whole[middle:], strict=True))
     assert all((a.events == b.events).all() for a, b in zip(rest[1:], whole[middle + 1 :], strict=True))

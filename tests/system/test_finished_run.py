@@ -152,7 +152,9 @@ def test_the_control_is_the_run_without_the_others(finished):
 
 def test_how_often_frames_are_recorded_changes_no_run(finished, tools, tmp_path):
     base = ['stop.time="60 ms"', 'cells.roller.start.rolling_alone="100 ms"']
-    tools.finish(tmp_path / "often", tools.settings(*base, 'record.every={ time = "0.3 ms" }'), "--checkpoint-every", "0")
+    tools.finish(
+        tmp_path / "often", tools.settings(*base, 'record.every={ time = "0.3 ms" }'), "--checkpoint-every", "0"
+    )
     one, other = (read_checkpoint(path / "checkpoint.npz") for path in (finished, tmp_path / "often"))
     own = [name for name in one if name.startswith(("state.", "bonds."))]
     assert len(own) > 10
@@ -161,8 +163,8 @@ def test_how_often_frames_are_recorded_changes_no_run(finished, tools, tmp_path)
 
 def test_peak_memory(tools, tmp_path):
     code = (
-        "import resource, subprocess, sys;"
-        "code = subprocess.run([sys.executable, '-m', 'mpad_core', *sys.argv[1:]], stdout=subprocess.DEVNULL).returncode;"
+        "import resource, subprocess, sys; words = [sys.executable, '-m', 'mpad_core', *sys.argv[1:]];"
+        "code = subprocess.run(words, stdout=subprocess.DEVNULL).returncode;"
         "print(code, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
     )
     words = [sys.executable, "-c", code, "run", str(tools.scene), "-o", str(tmp_path / "run")]

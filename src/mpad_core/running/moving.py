@@ -223,8 +223,10 @@ def _largest_move(change: Array, dt: float, radii: Array) -> float:
     largest = 0.0
     for i in range(change.shape[0]):
         lever = 1.0 if i % 6 < 3 else radii[i // 6]
-        if not abs(change[i]) * dt * lever <= largest:  # so that a NaN counts as large
-            largest = abs(change[i]) * dt * lever
+        move = abs(change[i]) * dt * lever
+        if not math.isfinite(move):
+            return math.inf
+        largest = max(largest, move)
     return largest
 
 

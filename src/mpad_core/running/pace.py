@@ -31,7 +31,8 @@ def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
 
     A test of P = 1 − exp(−k Δt) a sub-step delays events by Δt/2, a relative error k Δt/2 of their rate: the largest
     on-rate and the unstressed off-rates bound the sub-step. Backward Euler errs by Δt/2 times the change of the
-    velocity; the height must stay within ``position``. The coupling is taken in the middle of a burst, so its error grows with η².
+    velocity; the height must stay within ``position``. The coupling is taken in the middle of a burst, so its error
+    grows with η².
     """
     tolerances = problem.tolerances
     bounds = [_LARGEST_SUB_STEP]

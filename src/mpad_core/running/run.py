@@ -133,8 +133,8 @@ def _begin(
     try:
         state = from_arrays(kept, len(order.problem.names), len(machine.fixed.molecules.kind))
         ended = kept["ended"]
-        if ended.shape != () or ended.dtype.kind != "U":
-            raise ValueError("why the run ended is no text")
+        if str(ended) not in {"", "time", *(condition.text for condition in order.stop_when)}:
+            raise ValueError(f"it ended by {str(ended)!r}")
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(f"{checkpoint}: does not fit the scene ({one_line(error)}); start anew with -o") from error
     log.write("resumed", run=directory.name, simulated=state.time)
