@@ -17,6 +17,8 @@ import pytest
 from mpad_core import cli
 from mpad_core.records import room
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 RECRUITMENT = ROOT / "examples" / "recruitment.toml"
 SHORT = ("--set", 'stop.time="2 ms"', "--set", 'cells.roller.start.rolling_alone="5 ms"')

@@ -7,6 +7,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT_SCENE = """\
 solver = "{solver}"
 stop = {{ time = "0.1 ms" }}

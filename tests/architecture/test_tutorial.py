@@ -16,7 +16,10 @@ MODULE = TUTORIAL / "mpad_dembo_spring.py"
 NEEDED = ("mpad-bell", "mpad-isolated", "mpad-surfaces")
 MOST_LINES = 25
 
-pytestmark = pytest.mark.timeout(900)  # installs numpy, scipy and numba anew, and compiles the kernels
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.timeout(900),
+]  # installs numpy, scipy and numba anew, and compiles the kernels
 
 
 def code_lines(file: Path) -> set[int]:

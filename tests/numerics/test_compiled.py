@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 _CALLER = """
 from mpad_core.numerics.compiled import compiled
 from probe_kernels.callee import inner

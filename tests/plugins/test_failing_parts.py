@@ -4,7 +4,10 @@ import h5py
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.filterwarnings("default")  # as a user has them: a warning must not do the work of a check
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("default"),
+]  # as a user has them: a warning must not do the work of a check
 
 SOLVER = '''\
 """A solver that is good or bad as a variable of the environment says, once a cell has passed x = 0.5 um."""

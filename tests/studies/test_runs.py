@@ -13,6 +13,8 @@ from mpad_core.records.checkpoint import read_checkpoint
 from mpad_core.running.recorder import Recorder
 from mpad_core.studies.report import summary_lines
 
+pytestmark = pytest.mark.slow
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 QUICK = ('cells.roller.start.rolling_alone="2 ms"',)
 

@@ -9,6 +9,8 @@ import pytest
 
 from mpad_core import cli
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 IN_PROCESS, IN_BATCHES, BATCH, RUN = 300, 40, 10, 6
 ODDITIES = [

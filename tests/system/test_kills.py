@@ -9,6 +9,8 @@ import pytest
 from mpad_core.records.checkpoint import read_checkpoint
 from mpad_core.records.reader import read_trajectory
 
+pytestmark = pytest.mark.slow
+
 CHAINS, KILLS = 3, 7
 OFTEN = ("--checkpoint-every", "0.2")
 FEW = ['stop.time="400 ms"', "stop.when=[]", 'cells.roller.start.rolling_alone="20 ms"']

@@ -52,6 +52,3 @@ class Encounter(Protocol):
     def factor(self, slip_speed: Array) -> Array:
         """Give the factor on the on-rate at slip speeds (µm/s)."""
         ...
-
-
-REQUIRED = ("name", "tension", "off_rate", "breakpoints")

@@ -22,6 +22,3 @@ class GapForce(Protocol):
     def gaps(self) -> tuple[float, float]:
         """Give the gap (µm) below which the law is continued by its tangent, and the one above which it is zero."""
         ...
-
-
-REQUIRED = ("name", "force", "gaps")

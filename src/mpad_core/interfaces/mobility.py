@@ -78,6 +78,3 @@ class FluidVelocity(Protocol):
     def flow(self, prepared: Any, motion: Motion, points: Array) -> Array:
         """Give the fluid's velocity (n, 3) at points (n, 3)."""
         ...
-
-
-REQUIRED = ("name", "traits", "plan", "prepare", "solve")

@@ -50,6 +50,3 @@ class Observer(Protocol):
     def close(self) -> None:
         """Hear that the run has ended."""
         ...
-
-
-REQUIRED = ("name", "fields", "see", "close")

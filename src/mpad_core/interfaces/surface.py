@@ -18,6 +18,3 @@ class Surface(Protocol):
     def densest(self) -> float:
         """Give an upper bound of the density (1/µm²) over the whole wall."""
         ...
-
-
-REQUIRED = ("name", "density", "densest")

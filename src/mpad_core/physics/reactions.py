@@ -95,7 +95,10 @@ class BondLaw:
     def _bounded(self, lengths: Array) -> float:
         """Give the last of the lengths, walking away from rest, at which the bond is of any consequence."""
         with np.errstate(over="ignore", invalid="ignore"):
-            tame = (self.off_rate(lengths) < _INSTANT) & (np.abs(self.tension(lengths)) < _STRONG)
+            rates, tensions = self.off_rate(lengths), np.abs(self.tension(lengths))
+        if (np.isnan(rates) & (tensions < _STRONG)).any():
+            raise PartError(f"bond model {self.species.model.name!r} gives an off-rate that is not a number")
+        tame = (rates < _INSTANT) & (tensions < _STRONG)
         return float(lengths[-1] if tame.all() else lengths[max(int(np.argmin(tame)) - 1, 1)])
 
     def edges(self) -> list[float]:

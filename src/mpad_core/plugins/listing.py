@@ -8,6 +8,7 @@ import attrs
 from mpad_core.interfaces.errors import MpadError
 from mpad_core.plugins.registry import KINDS, InstalledPart, installed, load
 
+_FILLED = {"rest_length", "stiffness", "kT"}  # of bond models, by the core
 _ABILITIES = {
     "solver": {"root": "thermal motion", "flow": "fluid velocity"},
     "bond": {"on_rate": "own on-rate", "exchange": "inner states", "factor": "shear-controlled encounter"},
@@ -42,4 +43,6 @@ def _described(part: InstalledPart) -> Iterator[str]:
 def _parameter(field: "attrs.Attribute[Any]") -> str:
     unit, doc = field.metadata.get("unit"), field.metadata.get("doc", "")
     default = "" if field.default is attrs.NOTHING else f" = {field.default!r}"
+    if field.alias in _FILLED:
+        doc = f"{doc} (filled from the scene)".strip()
     return f"      {field.alias}{default}{f' [{unit}]' if unit else ''}  {doc}".rstrip()

@@ -12,7 +12,6 @@ from typing import Any
 import pluggy
 from attrs import frozen
 
-from mpad_core.interfaces import bonds, forces, mobility, observer, surface
 from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.plugins.hookspecs import Hooks
 
@@ -28,11 +27,11 @@ class Kind:
 
 
 KINDS = {
-    "solver": Kind("mpad_mobility_solvers", mobility.REQUIRED),
-    "bond": Kind("mpad_bond_models", bonds.REQUIRED),
-    "surface": Kind("mpad_surfaces", surface.REQUIRED),
-    "force": Kind("mpad_force_laws", forces.REQUIRED),
-    "observer": Kind("mpad_observers", observer.REQUIRED),
+    "solver": Kind("mpad_mobility_solvers", ("name", "traits", "plan", "prepare", "solve")),
+    "bond": Kind("mpad_bond_models", ("name", "tension", "off_rate", "breakpoints")),
+    "surface": Kind("mpad_surfaces", ("name", "density", "densest")),
+    "force": Kind("mpad_force_laws", ("name", "force", "gaps")),
+    "observer": Kind("mpad_observers", ("name", "fields", "see", "close")),
     "command": Kind("mpad_commands", ("name",)),
 }
 

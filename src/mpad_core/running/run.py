@@ -157,6 +157,8 @@ def _go_on(
     """March to the end; give the last state, why it ended, and how many outer steps it took."""
     if ended:
         return state, ended, 0
+    # a condition may hold already: for the first state, or for one kept just before the process died
+    ended = first_that_holds(order.stop_when, order.problem, state) or ""
     kept_at, steps, before = time.monotonic(), 0, state
     marching = march(machine, state, order.until)
     next(marching)

@@ -60,7 +60,8 @@ class Path:
             return np.zeros(len(tip_gap), bool)
         low, high = problem.contact.gaps()
         force = np.where(tip_gap < high, problem.contact.force(np.clip(tip_gap, low, high)), 0.0)
-        return force > _ON_CONTACT * abs(problem.external[i, 2])
+        weight = -problem.external[i, 2]
+        return (force > _ON_CONTACT * weight) & (weight > 0)
 
 
 def free_part(path: Path, trajectory: Trajectory) -> Path:

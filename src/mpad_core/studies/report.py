@@ -29,7 +29,8 @@ def _passage_lines(passage: dict[str, Any]) -> Iterator[str]:
     past = ", ".join(passage["past"])
     first = passage["passages"][0]
     yield f"passage of {passage['cell']} past {past}:"
-    yield f"  free stream: U/(gamma z) = {first['free_stream_U_over_gamma_z']:.6f}"
+    if first["free_stream_U_over_gamma_z"] is not None:
+        yield f"  free stream: U/(gamma z) = {first['free_stream_U_over_gamma_z']:.6f}"
     for side in ("upstream", "downstream"):
         found = first[f"least_overlap_{side}"]
         if found:
