@@ -16,7 +16,7 @@ from mpad_core.numerics.compiled import compiled
 Function = Callable[[Array], Array]
 
 _NODES = np.array([0.0, 1 / 3, 2 / 3, 1.0])
-_BETWEEN = np.array([0.1273, 0.5, 0.8727, 0.02, 0.98])  # where a cubic through the nodes errs most, and near the ends
+_BETWEEN = np.array([0.02, 0.1273, 1 / 6, 0.5, 5 / 6, 0.8727, 0.98])  # a cubic through the nodes errs most at 0.1273
 _TO_POWERS = np.linalg.inv(np.vander(_NODES, 4, increasing=True))  # values at the nodes -> coefficients
 _MOST_CELLS = 1 << 15
 
@@ -54,7 +54,7 @@ def _points(lower: float, upper: float, cells: int, nodes: Array) -> Array:
 
 def _piece(functions: Sequence[Function], lower: float, upper: float, error: float) -> Array:
     """Give the coefficients (cells, columns, 4) of one piece."""
-    cells = 4
+    cells = 16
     while cells <= _MOST_CELLS:
         values = np.stack([f(_points(lower, upper, cells, _NODES)) for f in functions], axis=1)
         coefficients: Array = values @ _TO_POWERS.T

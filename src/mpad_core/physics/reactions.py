@@ -23,6 +23,7 @@ _NEGLIGIBLE = 1e-9  # of the unstressed on-rate: beyond, no bond forms
 _FALLEN = 1e-3  # of its largest value: an on-rate that has fallen so far at ten rest lengths has a reach of its own
 _INSTANT = 1e8  # 1/s: a bond that breaks faster does not live through any sub-step
 _STRONG = 1e6  # pN: no bond of any cell comes near
+_MODEST = 1e3  # pN: any model must give a rate at such a tension
 _FARTHEST = 30.0  # rest lengths; tables end here at the latest, and go on by their tangent
 _POINTS, _WEIGHTS = leggauss(24)
 
@@ -96,7 +97,7 @@ class BondLaw:
         """Give the last of the lengths, walking away from rest, at which the bond is of any consequence."""
         with np.errstate(over="ignore", invalid="ignore"):
             rates, tensions = self.off_rate(lengths), np.abs(self.tension(lengths))
-        if (np.isnan(rates) & (tensions < _STRONG)).any():
+        if (np.isnan(rates) & (tensions < _MODEST)).any():  # far beyond, 0 · exp(…) may overflow to one
             raise PartError(f"bond model {self.species.model.name!r} gives an off-rate that is not a number")
         tame = (rates < _INSTANT) & (tensions < _STRONG)
         return float(lengths[-1] if tame.all() else lengths[max(int(np.argmin(tame)) - 1, 1)])
