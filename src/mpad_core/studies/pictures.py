@@ -63,9 +63,13 @@ def _draw_overlap(panel: Any, paths: Sequence[Path], alone: Sequence[Path]) -> N
 
 
 def _draw_contribution(panel: Any, path: Path, alone: Sequence[Path], on_rates: Sequence[float]) -> None:
-    panel.plot(path.dx, 1e3 * contribution(path, alone[0]), color=_INK, lw=1.5)
+    share = 1e3 * contribution(path, alone[0])
+    low, high = 1.5 * min(float(np.nanmin(share)), -8.0), 1.5 * max(float(np.nanmax(share)), 8.0)
+    panel.plot(path.dx, share, color=_INK, lw=1.5)
+    panel.set_ylim(low, high)
     panel.axhline(0, color="black", lw=0.6)
     panel.set_yscale("symlog", linthresh=5)
+    panel.set_yticks([tick for tick in (-1000, -100, -10, 0, 10, 100, 1000) if low <= tick <= high])
     panel.set_ylabel("δ less δ alone,\nsame place (nm)")
 
 
