@@ -160,11 +160,12 @@ def burst(
         unfit = _refused_group(system, motion)
         if unfit >= 0:
             return NOT_POSITIVE, done, unfit
-        break_bonds(bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
-        form_bonds(
-            listing.sites, listing.first, bonds, bound, system, motion, turns, dice, step, dt, events, event_count
-        )
-        attach(bonds, system.molecules, turns, attached)
+        if listed > 0 or bonds.living[0] > 0:  # calls with nothing to do would cost a quarter of the sub-step
+            break_bonds(bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
+            form_bonds(
+                listing.sites, listing.first, bonds, bound, system, motion, turns, dice, step, dt, events, event_count
+            )
+            attach(bonds, system.molecules, turns, attached)
         for group in range(groups):
             outcome = _move_group(group, dt, system, bonds, attached, motion, turns)
             if outcome != REACHED:

@@ -39,6 +39,8 @@ def frame_of(problem: Problem, hazards: Hazards, before: State, after: State, sh
 
 def _bond_counts(before: State, after: State, time: float) -> Any:
     """Count each cell's bonds at a time: those before, and the events since."""
+    if before is after:  # its own events are in its counts already
+        return after.bond_counts()
     counts = before.bond_counts()
     past = after.events[after.events["time"] <= time]
     np.add.at(counts, past["cell"], np.where(past["kind"] == 0, 1, -1))

@@ -273,8 +273,8 @@ class Effects:
 class Every:
     """When a frame is recorded: whichever comes first."""
 
-    time: float = _measure("s", Within(0, 1e7, above=True), default=0.01, doc="a frame at least this often")
-    dx: float | None = _measure("um", Within(0, 1e7, above=True), default=None, doc="a frame for each such step in dx")
+    time: float = _measure("s", Within(1e-9, 1e7), default=0.01, doc="a frame at least this often")
+    dx: float | None = _measure("um", Within(1e-6, 1e7), default=None, doc="a frame for each such step in dx")
 
 
 @frozen(kw_only=True)

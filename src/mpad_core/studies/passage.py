@@ -45,7 +45,7 @@ class Path:
     @property
     def speed(self) -> Array:
         """Speed (µm/s) at which Δx changes."""
-        return np.gradient(self.dx, self.times)
+        return np.gradient(self.dx, self.times) if len(self.times) > 1 else np.zeros(len(self.times))
 
     def hazard(self, on_rate: float | None = None) -> Array:
         """Give the capture hazard (1/s) along the path, of the scene's on-rate or of another (1/s)."""
