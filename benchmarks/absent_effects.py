@@ -45,11 +45,11 @@ height = "6 um"
 """
 STRUCK = {  # what each bare burst does without: calls, loops over what is absent, and conditions
     "everything": ("break_bonds", "form_bonds", "attach", "_list_is_short", "attached.first", "contacts.pair_first",
-                   "_add_wall_contact"),
+                   "contacts.reach"),
     "reactions": ("break_bonds", "form_bonds", "_list_is_short"),
     "sorting of bonds": ("attach",),
     "loads of bonds": ("attached.first",),
-    "contacts": ("contacts.pair_first", "_add_wall_contact"),
+    "contacts": ("contacts.pair_first", "contacts.reach"),
 }  # fmt: skip
 
 
@@ -121,7 +121,8 @@ def prepared(text: str, sub_steps: int) -> Any:
     configuration = march.configuration_of(problem, state)
     coupling = machine.coupler.at(configuration, state.mean_loads, None)
     pairs = assembly.near_pairs(problem, state.centres, np.inf)
-    limits = pace.limits(problem, pairs, machine.pace, state.centres, state.wall_gaps, 1.0)
+    moves = pace.pair_moves(problem, pairs, state.centres, machine.pace.share)
+    limits = pace.limits(problem, machine.pace, moves, state.centres, state.wall_gaps, 1.0)
     never = np.full(len(pairs), np.inf)
     limits = limits._replace(sub_step=1e-6, most=sub_steps, pair_move=never)
     system = assembly.system(problem, machine.fixed, state, coupling, 0.0)

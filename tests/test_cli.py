@@ -10,12 +10,11 @@ import sys
 import time
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
-from mpad_core import cli
 from mpad_core.records import room
+from recorded import assert_same
 
 pytestmark = pytest.mark.slow
 
@@ -49,44 +48,6 @@ def until(condition, seconds=200.0):
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.02)
-
-
-def content(path):
-    found = {}
-
-    def take(name, item):
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    with h5py.File(path, "r") as file:
-        file.visititems(take)
-    return found
-
-
-def assert_same(one, other):
-    first, second = content(one), content(other)
-    assert first.keys() == second.keys()
-    for name, values in first.items():
-        assert np.asarray(values).tobytes() == np.asarray(second[name]).tobytes(), name
-
-
-@pytest.fixture
-def mpad(monkeypatch, capsys):
-    """Call the command line in this process; whatever escapes it, but its exit, fails the test."""
-
-    def call(*words):
-        monkeypatch.setattr(sys, "argv", ["mpad", *map(str, words)])
-        capsys.readouterr()
-        code = 0
-        try:
-            cli.main()
-        except SystemExit as leaving:
-            code = leaving.code or 0
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return code, out, err
-
-    return call
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,8 @@
 """A part that fails in the middle of a run: caught, named with the step, and the run goes on with a good one."""
 
-import h5py
-import numpy as np
 import pytest
+
+from recorded import assert_same, datasets
 
 pytestmark = [
     pytest.mark.slow,
@@ -115,25 +115,6 @@ def scene(tmp_path, distribution):
     return path
 
 
-def content(path):
-    found = {}
-
-    def take(name, item):
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    with h5py.File(path, "r") as file:
-        file.visititems(take)
-    return found
-
-
-def assert_same(one, other):
-    first, second = content(one), content(other)
-    assert first.keys() == second.keys()
-    for name, values in first.items():
-        assert np.asarray(values).tobytes() == np.asarray(second[name]).tobytes(), name
-
-
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_failing_solver_is_named_with_its_step_and_the_run_goes_on(fault, scene, mpad, tmp_path, monkeypatch):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
@@ -236,10 +217,10 @@ def test_an_observer_that_writes_to_the_frame_changes_no_run(scene, distribution
     assert mpad("run", scene, "-o", tmp_path / "whole", *watched)[0] == 0
     monkeypatch.setenv("NOSY", "writes")
     code, _, err = mpad("run", scene, "-o", tmp_path / "cut", *watched)
-    whole, cut = (content(tmp_path / name / "trajectory.h5") for name in ("whole", "cut"))
+    whole, cut = (datasets(tmp_path / name / "trajectory.h5") for name in ("whole", "cut"))
     if code == 0:
         name = "mpad/positions"
-        assert np.array_equal(whole[name], cut[name])
+        assert whole[name] == cut[name]
     else:
         assert "nosy" in err
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from mpad_core.physics.coupling import lone_velocity
 from mpad_core.physics.measures import hazards
+from mpad_core.physics.state import State
 from mpad_core.running.frames import frame_of, frames
-from mpad_core.running.march import _with_captures, free_stream_speed
+from mpad_core.running.march import _with_captures
 from mpad_core.running.schedules import Cadence, Schedule
 from mpad_core.running.stopping import StopWhen, first_that_holds
 
@@ -186,6 +188,12 @@ def seen(machine: Any, states: list[Any]) -> list[Any]:
     return found
 
 
+def lone_speed(machine: Any, state: State) -> float:
+    """Give the speed at which the flow alone would carry the first cell."""
+    radius, height, gap = machine.problem.radii[0], state.centres[0, 2], state.wall_gaps[0]
+    return lone_velocity(machine.problem.setting, float(radius), float(height), float(gap))
+
+
 def moving(state: Any, speed: float, times: Any) -> list[Any]:
     return [evolve(state, time=float(t), centres=state.centres + np.array([speed * t, 0, 0])) for t in times]
 
@@ -194,7 +202,7 @@ def moving(state: Any, speed: float, times: Any) -> list[Any]:
 def test_caught_is_bound_for_a_while_and_slow(bound: Any, share: float, expected: bool) -> None:
     """The defaults: 100 ms, and slower than 0.1 of the cell's own free stream."""
     machine, state = bound
-    speed = share * free_stream_speed(machine.problem, state, 0)
+    speed = share * lone_speed(machine, state)
     found = seen(machine, moving(state, speed, np.arange(0, 0.2, 1e-3)))
     caught = [bool(np.isfinite(after.caught_since[0])) for after in found]
     assert not any(caught[:99])
@@ -221,7 +229,7 @@ def test_a_lost_bond_ends_a_capture_and_the_count(bound: Any, lab: Any) -> None:
 def test_a_cell_slow_at_first_sight_of_a_later_while_is_caught_then(bound: Any) -> None:
     """Fast over the first 100 ms, at rest from then on: caught at the end of the next while, not before."""
     machine, state = bound
-    speed = 0.5 * free_stream_speed(machine.problem, state, 0)
+    speed = 0.5 * lone_speed(machine, state)
     fast = moving(state, speed, np.arange(0, 0.1, 1e-3))
     rest = moving(evolve(state, centres=fast[-1].centres), 0.0, np.arange(0.1, 0.35, 1e-3))
     found = seen(machine, [*fast, *rest])

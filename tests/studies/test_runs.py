@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
@@ -12,6 +11,7 @@ from mpad_core.interfaces.errors import InputError
 from mpad_core.records.checkpoint import read_checkpoint
 from mpad_core.running.recorder import Recorder
 from mpad_core.studies.report import summary_lines
+from recorded import datasets
 
 pytestmark = pytest.mark.slow
 
@@ -21,18 +21,6 @@ QUICK = ('cells.roller.start.rolling_alone="2 ms"',)
 
 class DeathError(BaseException):
     """Stands for the death of the process: nobody handles it."""
-
-
-def content(path):
-    found = {}
-
-    def take(name, item):
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    with h5py.File(path, "r") as file:
-        file.visititems(take)
-    return {name: np.asarray(values).tobytes() for name, values in found.items()}
 
 
 @pytest.fixture
@@ -73,7 +61,10 @@ def test_seeds_and_controls_have_their_folders(tmp_path):
 def test_a_second_seed_is_the_first_of_a_scene_with_that_seed(recruitment, tmp_path):
     run(recruitment("passage.seeds=2"), tmp_path / "both")
     run(recruitment("seed=2"), tmp_path / "second")
-    one, other = content(tmp_path / "both" / "seed-2" / "trajectory.h5"), content(tmp_path / "second" / "trajectory.h5")
+    one, other = (
+        datasets(tmp_path / "both" / "seed-2" / "trajectory.h5"),
+        datasets(tmp_path / "second" / "trajectory.h5"),
+    )
     assert [name for name in one if one[name] != other[name]] == ["mpad/scene"]  # which says the seed asked for
 
 
@@ -104,7 +95,7 @@ def test_death_in_the_last_step_changes_nothing(moment, ends, recruitment, tmp_p
         with pytest.raises(DeathError):
             run(scene, tmp_path / "cut", checkpoint_every=0.0)
     run(scene, tmp_path / "cut", resume=True)
-    whole, cut = (content(tmp_path / name / "trajectory.h5") for name in ("whole", "cut"))
+    whole, cut = (datasets(tmp_path / name / "trajectory.h5") for name in ("whole", "cut"))
     assert whole.keys() == cut.keys()
     assert not [name for name in whole if whole[name] != cut[name]]
 
@@ -128,7 +119,7 @@ def test_death_between_run_and_control(recruitment, tmp_path, monkeypatch):
             run(recruitment(), tmp_path / "cut")
     run(recruitment(), tmp_path / "cut", resume=True)
     for name in ("trajectory.h5", "control/trajectory.h5"):
-        assert content(tmp_path / "whole" / name) == content(tmp_path / "cut" / name)
+        assert datasets(tmp_path / "whole" / name) == datasets(tmp_path / "cut" / name)
 
 
 def test_a_directory_is_claimed_by_its_scene(recruitment, tmp_path):

@@ -4,9 +4,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import h5py
-import numpy as np
 import pytest
+
+from recorded import assert_same, datasets
 
 RECRUITMENT = Path(__file__).parents[2] / "examples" / "recruitment.toml"
 
@@ -20,19 +20,6 @@ def start(directory, arguments, *more):
 def settings(*pairs):
     """Write settings as arguments."""
     return [word for pair in pairs for word in ("--set", pair)]
-
-
-def datasets(path):
-    """Read all that is in a finished trajectory, as bytes."""
-    found = {}
-
-    def take(name, item):
-        if isinstance(item, h5py.Dataset):
-            found[name] = (str(item.dtype), item.shape, np.asarray(item[()]).tobytes())
-
-    with h5py.File(path, "r") as file:
-        file.visititems(take)
-    return found
 
 
 @pytest.fixture(scope="session")
@@ -57,9 +44,7 @@ def tools():
             first = sorted(path.relative_to(one) for path in one.rglob("trajectory.h5"))
             assert first == sorted(path.relative_to(other) for path in other.rglob("trajectory.h5"))
             for name in first:
-                whole, cut = datasets(one / name), datasets(other / name)
-                assert whole.keys() == cut.keys()
-                assert not [key for key in whole if whole[key] != cut[key]], name
+                assert_same(one / name, other / name)
                 kept = name.with_name("checkpoint.npz")
                 assert (one / kept).read_bytes() == (other / kept).read_bytes(), kept
 

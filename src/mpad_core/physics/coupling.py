@@ -16,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import PartError, RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
-from mpad_core.interfaces.values import Configuration, Motion, Setting
+from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
 from mpad_core.physics import asking
 from mpad_core.physics.problem import Problem
@@ -24,6 +24,7 @@ from mpad_core.physics.questions import constrained_motion, unit_load
 
 LARGEST_GROUP = 8  # cells: a burst's cost grows with the cube
 NOT_FELT = 1e12  # radii: the wall functions are those of an unbounded fluid to the last bit at this gap
+_ROOM_TO_MOVE = 1.25  # of the reach of contact
 _ASYMMETRY = 0.1  # of sqrt(M_ii M_jj): coarse boundary elements reach 0.03 (near contact), and are symmetrised
 _REACHES = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group
 
@@ -36,7 +37,6 @@ class Coupling:
     matrices: tuple[Array, ...]  # (6n, 6n) each: C
     loads: Array  # (N, 6): k + g
     guess: Array | None = None
-    error: float = 0.0  # the solver's own estimate
 
 
 class Coupler(Protocol):
@@ -61,9 +61,15 @@ def lone_cell(setting: Setting, radius: float, height: float, gap: float) -> tup
     return resistance, load
 
 
+def lone_velocity(setting: Setting, radius: float, height: float, gap: float) -> float:
+    """Give the speed at which the flow alone carries a lone cell along the wall, exactly."""
+    resistance, load = lone_cell(setting, radius, height, gap)
+    return float(np.linalg.solve(resistance, load)[0])
+
+
 def free_motion(
     solver: MobilitySolver, plan: Any, setting: Setting, configuration: Configuration, speed: float
-) -> tuple[Array, Array, Motion]:
+) -> tuple[Array, Array]:
     """Ask a solver for mobility (6n, 6n), symmetrised, and free velocities (6n,), in one block of solves.
 
     Loads are such as give velocities of about `speed` (µm/s), so that taking the free velocities away again loses no
@@ -79,7 +85,7 @@ def free_motion(
     size_of = np.sqrt(np.abs(np.diag(mobility)))
     if (np.abs(mobility - mobility.T) > _ASYMMETRY * np.outer(size_of, size_of)).any():
         raise PartError(f"solver {solver.name!r} gave a mobility that is not symmetric, as reciprocity demands")
-    return 0.5 * (mobility + mobility.T), answer[:, -1].copy(), motion
+    return 0.5 * (mobility + mobility.T), answer[:, -1].copy()
 
 
 @frozen(kw_only=True, eq=False)
@@ -147,10 +153,10 @@ class SolverCoupling:
         held = np.flatnonzero(problem.held)
         groups = group_cells(configuration, problem.held, self.touching)
         loads = np.zeros((len(problem.radii), 6))
-        matrices, resistances, errors = [], [], [0.0]
+        matrices = []
         for group in groups:
             members = np.concatenate([group, held])
-            resistance, free, error = self._resistance(configuration.part(members), members)
+            resistance, free = self._resistance(configuration.part(members), members)
             own = 6 * len(group)
             for place, cell in enumerate(group):
                 lone, ambient = self._lone(configuration, cell)
@@ -158,28 +164,24 @@ class SolverCoupling:
                 loads[cell] = resistance[o : o + 6] @ free - ambient
                 resistance[o : o + 6, o : o + 6] -= lone
             matrices.append(np.ascontiguousarray(resistance[:own, :own]))
-            resistances.append(resistance)
-            errors.append(error)
         if len(groups) > 1:
             guess = self._add_outside(configuration, groups, matrices, loads, mean_loads, guess)
-        return Coupling(groups=groups, matrices=tuple(matrices), loads=loads, guess=guess, error=max(errors))
+        return Coupling(groups=groups, matrices=tuple(matrices), loads=loads, guess=guess)
 
     def _lone(self, configuration: Configuration, cell: int) -> tuple[Array, Array]:
         height = float(configuration.centres[cell, 2])
         gap = float(configuration.wall_gaps[cell])
         return lone_cell(self.problem.setting, float(configuration.radii[cell]), height, gap)
 
-    def _resistance(self, configuration: Configuration, members: Indices) -> tuple[Array, Array, float]:
-        mobility, free, motion = free_motion(
-            self.problem.solver, self.plan, self.problem.setting, configuration, self.speed
-        )
+    def _resistance(self, configuration: Configuration, members: Indices) -> tuple[Array, Array]:
+        mobility, free = free_motion(self.problem.solver, self.plan, self.problem.setting, configuration, self.speed)
         try:
             resistance = cho_solve(cho_factor(mobility), np.eye(len(mobility)))
         except (np.linalg.LinAlgError, ValueError) as error:
             names = ", ".join(self.problem.names[i] for i in members)
             solver = self.problem.solver.name
             raise RefusedError(f"solver {solver!r}: mobility of {names} is not positive definite ({error})") from error
-        return 0.5 * (resistance + resistance.T), free, motion.report.error
+        return 0.5 * (resistance + resistance.T), free
 
     def _add_outside(
         self, configuration: Configuration, groups: tuple[Indices, ...], matrices: list[Array], loads: Array,
@@ -199,11 +201,14 @@ class SolverCoupling:
         return motion.guess
 
 
+def contact_reach(problem: Problem) -> float:
+    """Give the smooth gap (µm) below which two cells may repel each other."""
+    return 0.0 if problem.contact is None else 2 * float(problem.roughness.max()) + problem.contact.gaps()[1]
+
+
 def contact_range(problem: Problem) -> float:
-    """Give the smooth gap (µm) below which two cells may be in contact, with room for what they move in a burst."""
-    if problem.contact is None:
-        return 0.0
-    return 1.25 * (2 * float(problem.roughness.max()) + problem.contact.gaps()[1])
+    """Give the smooth gap (µm) below which two cells may come to repel each other within a burst."""
+    return _ROOM_TO_MOVE * contact_reach(problem)
 
 
 def coupler(problem: Problem, plan: Any = None) -> Coupler:

@@ -8,7 +8,6 @@ import attrs
 from mpad_core.interfaces.errors import MpadError
 from mpad_core.plugins.registry import KINDS, InstalledPart, installed, load
 
-_FILLED = {"rest_length", "stiffness", "kT"}  # of bond models, by the core
 _ABILITIES = {
     "solver": {"root": "thermal motion", "flow": "fluid velocity"},
     "bond": {"on_rate": "own on-rate", "exchange": "inner states", "factor": "shear-controlled encounter"},
@@ -37,12 +36,12 @@ def _described(part: InstalledPart) -> Iterator[str]:
     if abilities:
         yield f"      can also: {', '.join(abilities)}"
     if attrs.has(loaded):
-        yield from (_parameter(field) for field in attrs.fields(loaded) if field.init)
+        yield from (_parameter(field, KINDS[part.kind].filled) for field in attrs.fields(loaded) if field.init)
 
 
-def _parameter(field: "attrs.Attribute[Any]") -> str:
+def _parameter(field: "attrs.Attribute[Any]", filled: tuple[str, ...]) -> str:
     unit, doc = field.metadata.get("unit"), field.metadata.get("doc", "")
     default = "" if field.default is attrs.NOTHING else f" = {field.default!r}"
-    if field.alias in _FILLED:
+    if field.alias in filled:
         doc = f"{doc} (filled from the scene)".strip()
     return f"      {field.alias}{default}{f' [{unit}]' if unit else ''}  {doc}".rstrip()

@@ -20,15 +20,18 @@ GROUP = "mpad"
 
 @frozen
 class Kind:
-    """One kind of part: the hook that gives it, and the members it must have."""
+    """One kind of part: the hook that gives it, the members it must have, the fields that the core fills."""
 
     hook: str
     members: tuple[str, ...]
+    filled: tuple[str, ...] = ()  # fields that the core fills where the scene is silent
 
 
 KINDS = {
     "solver": Kind("mpad_mobility_solvers", ("name", "traits", "plan", "prepare", "solve")),
-    "bond": Kind("mpad_bond_models", ("name", "tension", "off_rate", "breakpoints")),
+    "bond": Kind(
+        "mpad_bond_models", ("name", "tension", "off_rate", "breakpoints"), filled=("rest_length", "stiffness", "kT")
+    ),
     "surface": Kind("mpad_surfaces", ("name", "density", "densest")),
     "force": Kind("mpad_force_laws", ("name", "force", "gaps")),
     "observer": Kind("mpad_observers", ("name", "fields", "see", "close")),

@@ -119,12 +119,19 @@ def local_density(problem: Problem, fixed: Fixed, centres: Array) -> Array:
     return ratio
 
 
+def pair_gaps(problem: Problem, pairs: Indices, centres: Array) -> Array:
+    """Give the gaps (P,) between the smooth spheres of pairs (P, 2), in µm."""
+    i, j = pairs[:, 0], pairs[:, 1]
+    gaps: Array = np.linalg.norm(centres[i] - centres[j], axis=1) - problem.radii[i] - problem.radii[j]
+    return gaps
+
+
 def near_pairs(problem: Problem, centres: Array, within: float) -> Indices:
     """List the pairs of cells, not both held, whose smooth gap is below `within` (µm): (P, 2), ascending."""
     i, j = np.triu_indices(len(problem.radii), 1)
-    gaps = np.linalg.norm(centres[i] - centres[j], axis=1) - problem.radii[i] - problem.radii[j]
-    chosen = (gaps < within) & ~(problem.held[i] & problem.held[j])
-    return np.stack([i[chosen], j[chosen]], axis=1).astype(np.int64)
+    pairs = np.stack([i, j], axis=1).astype(np.int64)
+    chosen = (pair_gaps(problem, pairs, centres) < within) & ~(problem.held[i] & problem.held[j])
+    return pairs[chosen]
 
 
 def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, reach: float) -> System:

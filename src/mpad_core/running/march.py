@@ -15,7 +15,7 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import BOND_EVENT, Configuration
 from mpad_core.numerics.tables import value
-from mpad_core.physics.coupling import Coupler, Coupling, contact_range, coupler, lone_cell
+from mpad_core.physics.coupling import Coupler, Coupling, contact_range, coupler, lone_velocity
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State
 from mpad_core.running import assembly, pace
@@ -87,11 +87,12 @@ def march(machine: Machine, state: State, until: float) -> Iterator[State]:
 def step(machine: Machine, state: State, until: float) -> State:
     """Take one outer step."""
     problem = machine.problem
-    pairs = _coupled_pairs(machine, state)
-    length = pace.expected_length(problem, pairs, machine.pace, state.centres, state.drift)
+    moves = pace.pair_moves(problem, _coupled_pairs(machine, state), state.centres, machine.pace.share)
+    length = pace.expected_length(machine.pace, moves, state.drift)
     middle = _ahead(problem, state, 0.5 * min(length, until - state.time))
     coupling = machine.coupler.at(middle, state.mean_loads, state.guess)
-    bounds = pace.limits(problem, pairs, machine.pace, state.centres, middle.wall_gaps, until - state.time)
+    left = until - state.time
+    bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, left)
     return _burst(machine, state, coupling, bounds)
 
 
@@ -173,14 +174,8 @@ def _with_captures(problem: Problem, state: State) -> State:
     caught = np.where(bound, state.caught_since, np.inf)
     for i in np.flatnonzero(bound & (state.time - since >= problem.caught.bound_for)):
         speed = abs(state.centres[i, 0] - at[i]) / max(state.time - since[i], 1e-300)
-        if speed < problem.caught.slower_than * free_stream_speed(problem, state, int(i)):
+        place = float(problem.radii[i]), float(state.centres[i, 2]), float(state.wall_gaps[i])
+        if speed < problem.caught.slower_than * lone_velocity(problem.setting, *place):
             caught[i] = min(caught[i], state.time)
         since[i], at[i] = state.time, state.centres[i, 0]  # a new while begins
     return evolve(state, bound_since=since, bound_at=at, caught_since=caught)
-
-
-def free_stream_speed(problem: Problem, state: State, cell: int) -> float:
-    """Give the speed (µm/s) at which the flow alone would carry a lone cell at its height."""
-    radius = float(problem.radii[cell])
-    resistance, load = lone_cell(problem.setting, radius, float(state.centres[cell, 2]), float(state.wall_gaps[cell]))
-    return float(np.linalg.solve(resistance, load)[0])

@@ -12,7 +12,7 @@ import numpy as np
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.rotations import matrix_of, turned, turned_vector
-from mpad_core.numerics.tables import value_and_slope
+from mpad_core.numerics.tables import Tables, value_and_slope
 from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
 from mpad_core.running.layout import Attached, Bonds, Molecules, Motion, Species, System
 from mpad_core.running.reacting import TENSION
@@ -104,13 +104,11 @@ def _add_bond(
 
 
 @compiled
-def _add_wall_contact(cell: int, shift: float, system: System, gap: Array, load: Array, stiffness: Array) -> None:
+def _add_wall_contact(tip_gap: float, law: Tables, load: Array, stiffness: Array) -> None:
     """Add the repulsion between a cell's bumps and the wall's."""
-    tip_gap = gap[cell] + shift - system.bodies.roughness[cell] - system.bodies.wall_tips
-    if tip_gap < system.contacts.reach:
-        force, slope = value_and_slope(system.contacts.law, 0, 0, tip_gap)
-        load[2] += force
-        stiffness[2, 2] -= slope
+    force, slope = value_and_slope(law, 0, 0, tip_gap)
+    load[2] += force
+    stiffness[2, 2] -= slope
 
 
 @compiled
@@ -153,15 +151,17 @@ def _add_loads(
     load: Array, stiffness: Array,
 ) -> None:  # fmt: skip
     """Add all loads but the fluid's, and their stiffness, for the group displaced and turned by `moved` (6n,)."""
-    groups, contacts = system.groups, system.contacts
+    bodies, groups, contacts = system.bodies, system.groups, system.contacts
     start = groups.first[group]
     arm = np.empty(3)
     for place in range(groups.first[group + 1] - start):
         cell = groups.cells[start + place]
         o = 6 * place
         own, own_stiffness = load[o : o + 6], stiffness[o : o + 6, o : o + 6]
-        own += system.bodies.external[cell]
-        _add_wall_contact(cell, moved[o + 2], system, motion.gap, own, own_stiffness)
+        own += bodies.external[cell]
+        tip_gap = motion.gap[cell] + moved[o + 2] - bodies.roughness[cell] - bodies.wall_tips
+        if tip_gap < contacts.reach:
+            _add_wall_contact(tip_gap, contacts.law, own, own_stiffness)
         for b in range(attached.first[cell], attached.first[cell + 1]):
             a = attached.arm[b]
             arm[0], arm[1], arm[2] = turned_vector(a[0], a[1], a[2], moved[o + 3], moved[o + 4], moved[o + 5])

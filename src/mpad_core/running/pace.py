@@ -1,13 +1,15 @@
 """How long steps may be: the sub-step of the burst, and how far a frozen coupling is used."""
 
+from typing import NamedTuple
+
 import numpy as np
 from attrs import frozen
 
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.tables import value
-from mpad_core.physics.coupling import contact_range
+from mpad_core.physics.coupling import contact_reach
 from mpad_core.physics.problem import Problem
-from mpad_core.running.assembly import Fixed
+from mpad_core.running.assembly import Fixed, pair_gaps
 from mpad_core.running.layout import Limits
 from mpad_core.running.reacting import OFF_RATE, ON_RATE
 
@@ -59,32 +61,38 @@ def _fastest(problem: Problem, fixed: Fixed) -> list[float]:
     return rates
 
 
-def moves(problem: Problem, pairs: Indices, centres: Array, share: float) -> Array:
-    """Give how far each pair (P,) may move relative to each other (µm): a share of its gap.
+class PairMoves(NamedTuple):
+    """How far pairs of cells may move relative to each other in a burst."""
+
+    pairs: Indices  # (P, 2)
+    allowed: Array  # (P,) µm
+
+
+def pair_moves(problem: Problem, pairs: Indices, centres: Array, share: float) -> PairMoves:
+    """Give how far each pair may move: a share of its gap.
 
     Where nothing but contact couples them, it is less than half the way to where they could touch.
     """
-    i, j = pairs[:, 0], pairs[:, 1]
-    gaps = np.linalg.norm(centres[i] - centres[j], axis=1) - problem.radii[i] - problem.radii[j]
-    allowed: Array = share * np.maximum(gaps, 1e-3 * np.minimum(problem.radii[i], problem.radii[j]))
+    gaps = pair_gaps(problem, pairs, centres)
+    allowed: Array = share * np.maximum(gaps, 1e-3 * problem.radii[pairs].min(axis=1))
     if problem.coupled:
-        return allowed
-    apart: Array = np.maximum(allowed, 0.4 * (gaps - contact_range(problem) / 1.25))
-    return apart
+        return PairMoves(pairs, allowed)
+    apart: Array = np.maximum(allowed, 0.4 * (gaps - contact_reach(problem)))
+    return PairMoves(pairs, apart)
 
 
-def expected_length(problem: Problem, pairs: Indices, pace: Pace, centres: Array, drift: Array) -> float:
+def expected_length(pace: Pace, moves: PairMoves, drift: Array) -> float:
     """Give how long (s) the next burst will last if the cells go on as before."""
-    if len(pairs) == 0:
+    if len(moves.pairs) == 0:
         return pace.longest
-    speeds = np.linalg.norm(drift[pairs[:, 0], :3] - drift[pairs[:, 1], :3], axis=1)
-    times = moves(problem, pairs, centres, pace.share) / np.maximum(speeds, 1e-300)
+    speeds = np.linalg.norm(drift[moves.pairs[:, 0], :3] - drift[moves.pairs[:, 1], :3], axis=1)
+    times = moves.allowed / np.maximum(speeds, 1e-300)
     # a burst ends with the first whole sub-step that passes a limit
     whole = max(np.ceil(min(pace.longest, times.min()) / pace.sub_step * (1 - 1e-9)), 1.0)
     return float(whole * pace.sub_step)
 
 
-def limits(problem: Problem, pairs: Indices, pace: Pace, centres: Array, middle_gaps: Array, left: float) -> Limits:
+def limits(problem: Problem, pace: Pace, moves: PairMoves, centres: Array, middle_gaps: Array, left: float) -> Limits:
     """Give the limits of a burst whose coupling was taken at `middle_gaps`; `left` (s) is the time to the run's end."""
     wanted = min(pace.longest, left)
     most = int(np.clip(np.ceil(wanted / pace.sub_step * (1 - 1e-9)), 1, _MOST_SUB_STEPS))
@@ -92,4 +100,4 @@ def limits(problem: Problem, pairs: Indices, pace: Pace, centres: Array, middle_
     free = problem.setting.wall & problem.coupled
     low = middle_gaps * (1 - _GAP_CHANGE) if free else np.full(len(middle_gaps), -np.inf)
     high = middle_gaps * (1 + _GAP_CHANGE) if free else np.full(len(middle_gaps), np.inf)
-    return Limits(pace.sub_step, most, centres, pairs, moves(problem, pairs, centres, pace.share), low, high)
+    return Limits(pace.sub_step, most, centres, moves.pairs, moves.allowed, low, high)

@@ -49,9 +49,6 @@ class Outcome:
     state: State = field(repr=False)
     ended: str  # "time", or the condition that held
     sub_step: float  # s
-    prepared_in: float  # s of wall time before the first step of this process
-    marched_in: float  # s of wall time of this process's march
-    outer_steps: int  # of this process
 
 
 def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Progress) -> Outcome:
@@ -69,21 +66,16 @@ def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Pr
         With a checkpoint written where there was room.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    began = time.monotonic()
     with listening() as signals:
         with _named_parts(order.problem, "before step one"):
             machine = make_ready(order.problem)
             recorder, state, ended = _begin(order, machine, directory, resume, signals, log)
-        prepared = time.monotonic()
         with _closed(recorder):
-            state, ended, steps = _go_on(order, machine, recorder, state, ended, signals, bar)
+            state, ended = _go_on(order, machine, recorder, state, ended, signals, bar)
     return Outcome(
         state=state,
         ended=ended,
         sub_step=machine.pace.sub_step,
-        prepared_in=prepared - began,
-        marched_in=time.monotonic() - prepared,
-        outer_steps=steps,
     )
 
 
@@ -153,13 +145,13 @@ def _prepared(machine: Machine, signals: Signals) -> State:
 
 def _go_on(
     order: Order, machine: Machine, recorder: Recorder, state: State, ended: str, signals: Signals, bar: Progress
-) -> tuple[State, str, int]:
-    """March to the end; give the last state, why it ended, and how many outer steps it took."""
+) -> tuple[State, str]:
+    """March to the end; give the last state and why it ended."""
     if ended:
-        return state, ended, 0
+        return state, ended
     # a condition may hold already: for the first state, or for one kept just before the process died
     ended = first_that_holds(order.stop_when, order.problem, state) or ""
-    kept_at, steps, before = time.monotonic(), 0, state
+    kept_at, before = time.monotonic(), state
     marching = march(machine, state, order.until)
     next(marching)
     while not ended:
@@ -173,7 +165,7 @@ def _go_on(
             except NearlyFullError:
                 recorder.keep(after)
                 raise
-        before, steps = after, steps + 1
+        before = after
         bar.update(after.time, after.step - after.zero)
         ended = first_that_holds(order.stop_when, order.problem, after) or ""
         if signals.received:
@@ -184,4 +176,4 @@ def _go_on(
             kept_at = time.monotonic()
     recorder.finish(before)
     recorder.keep(before, ended or "time")
-    return before, ended or "time", steps
+    return before, ended or "time"

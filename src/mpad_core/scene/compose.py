@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 from attrs import evolve
 
-from mpad_core.arrays import Array
+from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.physics.problem import BondSpecies, CaughtWhen, Effect, Problem, Tolerances
@@ -49,11 +49,9 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
     species = _species(scene) if scene.bonds and scene.effects.bonds != "off" else ()
     sites = _site_densities(scene, cells)
     binds = np.array([cell.binds and effects["bonds"].on for cell in cells.values()])
-    names = list(cells)
-    partners = [scene.partner_of(name) if name in scene.cells else None for name in names]
-    partner = np.array([-1 if other is None else names.index(other) for other in partners], np.int64)
+    partner = _partners(scene, list(cells))
     return Problem(
-        names=tuple(names),
+        names=tuple(cells),
         kinds=tuple(cell.kind for cell in cells.values()),
         radii=radii,
         roughness=np.array([kind.roughness for kind in kinds]),
@@ -64,7 +62,7 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         alone_for=np.array([cell.start.rolling_alone if isinstance(cell, Cell) else 0.0 for cell in cells.values()]),
         zero_overlap=np.array([scene.zero_overlap_height(cell.kind) for cell in cells.values()]),
         partner=partner,
-        dx_from=start[np.where(partner < 0, np.arange(len(names)), partner), 0],
+        dx_from=start[np.where(partner < 0, np.arange(len(cells)), partner), 0],
         external=_weights(scene, effects["gravity"], cells),
         setting=setting,
         solver=solver,
@@ -78,6 +76,12 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         effects=tuple(effects.values()),
         site_kinds=_site_names(scene),
     )
+
+
+def _partners(scene: Scene, names: list[str]) -> Indices:
+    """Give the cell that each cell's Δx is measured from; -1 for its own place at the start."""
+    partners = [scene.partner_of(name) if name in scene.cells else None for name in names]
+    return np.array([-1 if other is None else names.index(other) for other in partners], np.int64)
 
 
 def _site_names(scene: Scene) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from attrs import frozen
 
-from mpad_core.physics.problem import Problem
+from mpad_core.physics.problem import BondSpecies, Problem
 
 _SLIDING = 0.67  # speed of a cell near the wall over that of the fluid at its centre
 _HELD_FORCE, _HELD_TORQUE = 1.7005, 0.944  # force and torque in shear on a held sphere touching the wall (O'Neill 1968)
@@ -53,45 +53,48 @@ def dimensionless_groups(problem: Problem, fluid_density: float, kT: float, long
     passage = passage_time(problem, longest)
     drag = 6 * math.pi * viscosity * radius * (_squeeze(max(gap, 1e-6 * radius), radius) if problem.setting.wall else 1)
     weight = abs(float(problem.external[low, 2]))
-    groups = [
+    reynolds = fluid_density * shear * radius**2 / viscosity
+    groups = [Group(name="Re", meaning="inertia by viscosity, rho gamma a^2 / mu", value=reynolds)]
+    if problem.species:
+        groups += _of_passage(problem.species[0], weight / drag * passage, math.sqrt(2 * kT * passage / drag))
+        groups += _of_bond(problem.species[0], radius, viscosity * shear, drag * shear)
+    return groups
+
+
+def _of_passage(species: BondSpecies, settled: float, spread: float) -> list[Group]:
+    """Compare what settles and what spreads (µm) in a passage with the bond's length."""
+    length = species.rest_length
+    return [
+        Group(name="settling", meaning="settling in a passage, by the bond's length", value=settled / length),
         Group(
-            name="Re",
-            meaning="inertia by viscosity, rho gamma a^2 / mu",
-            value=fluid_density * shear * radius**2 / viscosity,
+            name="spread",
+            meaning="thermal spread in height in a passage, by the bond's length",
+            value=spread / length,
         ),
     ]
-    for species in problem.species[:1]:
-        length = species.rest_length
-        spread = math.sqrt(2 * kT * passage / drag)
-        stiffness = float(np.diff(species.model.tension(np.array([1.01, 1.02]) * length))[0] / (0.01 * length))
-        force = _HELD_FORCE * 6 * math.pi * viscosity * radius**2 * shear
-        torque = _HELD_TORQUE * 4 * math.pi * viscosity * radius**3 * shear
-        tether = math.sqrt(radius / (2 * length)) * (force + torque / radius)
-        lengths = np.array([length, length + tether / max(stiffness, 1e-300)])
-        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            rates = np.asarray(species.model.off_rate(lengths), float)
-            speeding = float(np.log(rates[1] / rates[0]))
-        relaxation = drag / max(stiffness, 1e-300) * shear
-        groups += [
-            Group(
-                name="settling",
-                meaning="settling in a passage, by the bond's length",
-                value=weight / drag * passage / length,
-            ),
-            Group(
-                name="spread",
-                meaning="thermal spread in height in a passage, by the bond's length",
-                value=spread / length,
-            ),
-            Group(
-                name="F r0/kT",
-                meaning="log of how much the load of a held cell on one tether speeds its breaking",
-                value=speeding,
-            ),
-            Group(
-                name="relaxation",
-                meaning="relaxation of one bond against the drag, by the shear time",
-                value=relaxation,
-            ),
-        ]
-    return groups
+
+
+def _of_bond(species: BondSpecies, radius: float, stress: float, pull: float) -> list[Group]:
+    """Compare a bond with the flow: `stress` is μγ (pN/µm²), `pull` the cell's drag times the shear rate (pN/µm)."""
+    length = species.rest_length
+    stiffness = float(np.diff(species.model.tension(np.array([1.01, 1.02]) * length))[0] / (0.01 * length))
+    stiffness = max(stiffness, 1e-300)
+    force = _HELD_FORCE * 6 * math.pi * stress * radius**2
+    torque = _HELD_TORQUE * 4 * math.pi * stress * radius**3
+    tether = math.sqrt(radius / (2 * length)) * (force + torque / radius)
+    lengths = np.array([length, length + tether / stiffness])
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        rates = np.asarray(species.model.off_rate(lengths), float)
+        speeding = float(np.log(rates[1] / rates[0]))
+    return [
+        Group(
+            name="F r0/kT",
+            meaning="log of how much the load of a held cell on one tether speeds its breaking",
+            value=speeding,
+        ),
+        Group(
+            name="relaxation",
+            meaning="relaxation of one bond against the drag, by the shear time",
+            value=pull / stiffness,
+        ),
+    ]

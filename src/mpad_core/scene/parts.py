@@ -8,7 +8,7 @@ import attrs
 from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.plugins import registry
 from mpad_core.scene.faults import Fault, WrongError, listed, shown, wrong
-from mpad_core.scene.spec import FILLED, PART_KEYS, Part, Slot
+from mpad_core.scene.spec import PART_KEYS, Part, Slot
 
 ReadValue = Callable[[Any, Any, str | None], Any]
 Fields = dict[str, "attrs.Attribute[Any]"]
@@ -28,7 +28,7 @@ def read_part(value: Any, slot: Slot, read: ReadValue) -> Part:
     """
     name, given = _named(value, slot)
     fields = _fields(slot.kind, name)
-    optional = FILLED.get(slot.kind, ())
+    optional = registry.KINDS[slot.kind].filled
     found, wrongs = {}, _unknown(given, fields, name) + _lacking(given, fields, optional, name)
     for key in (key for key in given if key in fields):
         try:

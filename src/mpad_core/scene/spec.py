@@ -21,7 +21,6 @@ Recorded: TypeAlias = Literal["overlap", "velocity", "bonds", "capture_hazard"]
 Measured: TypeAlias = Literal["dx", "x", "y", "z", "overlap", "caught"]
 
 PART_KEYS = {"surface": "layout", "force": "law"}  # the key that names a part of this kind; elsewhere "name"
-FILLED = {"bond": ("rest_length", "stiffness", "kT")}  # fields of parts that the core fills where the scene is silent
 WATER = 1e-9  # pN s²/µm⁴ = 1000 kg/m³
 
 

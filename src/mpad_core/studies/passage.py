@@ -11,7 +11,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from mpad_core.arrays import Array
-from mpad_core.physics.coupling import lone_cell
+from mpad_core.physics.coupling import lone_velocity
 from mpad_core.physics.measures import hazards
 from mpad_core.physics.problem import Problem
 from mpad_core.records.trajectory import Trajectory
@@ -144,9 +144,8 @@ def capture_odds(path: Path, on_rate: float | None = None) -> dict[str, Any]:
 def free_stream_ratio(problem: Problem, cell: int, z: float) -> float:
     """Give U / γz of a lone cell at a height, exactly."""
     radius = float(problem.radii[cell])
-    resistance, load = lone_cell(problem.setting, radius, z, z - radius)
     shear = problem.setting.shear_rate
-    return float(np.linalg.solve(resistance, load)[0] / (shear * z)) if shear else float("nan")
+    return lone_velocity(problem.setting, radius, z, z - radius) / (shear * z) if shear else float("nan")
 
 
 def describe(path: Path, free: Path, alone: Path | None, on_rates: Sequence[float]) -> dict[str, Any]:
