@@ -18,12 +18,14 @@ class AskedSolver:
     ----------
     solver
         The solver; give it in the class that inherits.
-    tolerance
-        To which identities hold: a few digits more than the solver's own iteration is converged to.
     """
 
     solver: MobilitySolver
-    tolerance: float = 1e-8
+
+    @property
+    def tolerance(self) -> float:
+        """Give to what identities hold: 1e-8, or ten times the `tolerance` that the solver says it iterates to."""
+        return max(1e-8, 10 * float(getattr(self.solver, "tolerance", 0.0)))
 
     def setting(self, wall: bool = True, shear_rate: float = SHEAR.shear_rate) -> Setting:
         """Give a setting, or skip the test if the solver does not treat it."""

@@ -1,0 +1,41 @@
+"""What has no answer is refused by name before anything is computed."""
+
+from typing import Any
+
+import numpy as np
+
+from mpad_core.arrays import Array
+from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.values import Configuration, Setting
+
+
+def refuse_bad(configuration: Configuration, setting: Setting) -> None:
+    """Refuse numbers that are not finite, and spheres that touch.
+
+    Raises
+    ------
+    RefusedError
+        Naming the first sphere or pair at fault and its number.
+    """
+    centres, radii, gaps = configuration.centres, configuration.radii, configuration.wall_gaps
+    _refuse("centre {} is not finite", centres, ~np.isfinite(centres).all(axis=1))
+    _refuse("radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
+    if setting.wall:
+        _refuse("gap {} µm: it touches or cuts the wall", gaps, ~((gaps > 0) & np.isfinite(gaps)))
+    i, j = np.triu_indices(len(radii), 1)
+    between = np.linalg.norm(centres[i] - centres[j], axis=1) - radii[i] - radii[j]
+    if not (between > 0).all():
+        k = int(np.argmin(between))
+        raise RefusedError(f"cdl-biem: spheres {i[k]} and {j[k]}: gap {between[k]} µm: they touch or overlap")
+
+
+def refuse_loads(loads: Array) -> None:
+    """Refuse loads that are not finite."""
+    if not np.isfinite(loads).all():
+        raise RefusedError("cdl-biem: the loads are not finite")
+
+
+def _refuse(fault: str, values: Array, bad: Any) -> None:
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise RefusedError(f"cdl-biem: sphere {first}: " + fault.format(values[first].tolist()))

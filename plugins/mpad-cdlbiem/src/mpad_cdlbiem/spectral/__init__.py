@@ -1,0 +1,1 @@
+"""The spectral discretisation: vector spherical harmonics, exact Galerkin."""
