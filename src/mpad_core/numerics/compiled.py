@@ -91,15 +91,28 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
     return kernel
 
 
+_REGROUPED = {"contract", "reassoc", "nsz"}
+
+
 def compiled_sums(function: Callable[P, R]) -> Callable[P, R]:
     """Compile as `compiled` does, but let products and sums be fused and regrouped, which vectorises inner products.
 
     For kernels of linear algebra, where the order of a sum means nothing; NaN and infinity keep their meaning, and
     the same machine gives the same bits.
     """
-    sums = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz"})
+    sums = numba.njit(cache=True, error_model="numpy", nogil=True, fastmath=_REGROUPED)
     kernel: Callable[P, R] = _forgiving(sums(function))
     return kernel
+
+
+def compiled_within(function: Callable[P, R]) -> Callable[P, R]:
+    """Make a function part of the kernels that call it, by whose rules it is compiled.
+
+    A kernel is optimised again, with all it calls, in each kernel above it: so the upper storeys of a tall building are
+    better not kernels of their own.
+    """
+    part: Callable[P, R] = numba.njit(inline="always", error_model="numpy")(function)
+    return part
 
 
 def compiled_parallel(function: Callable[P, R]) -> Callable[P, R]:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mpad_cdlbiem.spectral.layout import between
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled
 
@@ -80,7 +81,7 @@ def choose(centres: Array, radii: Array, gaps: Array, wall: bool, spread: float,
             k += 1
     for k in range(count):
         i, j = who[k]
-        distance = math.sqrt(((centres[i] - centres[j]) ** 2).sum())
+        distance = between(centres, i, j)
         alphas = decay(distance, radii[i], radii[j])
         for side in range(2):
             sphere, wanted = who[k, side], needed(spread, alphas[side])
@@ -111,7 +112,7 @@ def coarser(fine: Degrees) -> Degrees:
 
 def spread_of(accuracy: float) -> float:
     """Give how far harmonics must fall for an accuracy of the velocities."""
-    return math.log(10 / accuracy)
+    return math.log(1000 / accuracy)
 
 
 def most_degree(accuracy: float) -> int:
@@ -135,7 +136,7 @@ def most_degrees(most: int, centres: Array, radii: Array) -> Indices:
     out = np.full(len(radii), most)
     for i in range(len(radii)):
         for j in range(len(radii)):
-            apart = math.sqrt(((centres[i] - centres[j]) ** 2).sum()) - radii[i] - radii[j]
+            apart = between(centres, i, j) - radii[i] - radii[j]
             if radii[j] < radii[i] and apart < 4 * radii[j]:
                 out[i] = max(out[i], min(HIGHEST_CHOSEN, int(most * math.sqrt(radii[i] / radii[j]))))
     return out

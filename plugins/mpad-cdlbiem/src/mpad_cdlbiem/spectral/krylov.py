@@ -9,7 +9,7 @@ from mpad_cdlbiem.spectral.layout import spots
 from mpad_cdlbiem.spectral.pairs import Pairs, Places, pair_product
 from mpad_cdlbiem.spectral.selves import add_rigid_columns, apply_inverse
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled_sums
+from mpad_core.numerics.compiled import compiled_sums, compiled_within
 
 RESTART = 60
 """Length of a cycle."""
@@ -24,6 +24,14 @@ class System(NamedTuple):
     operators: Array  # image operators, flat
     inverses: Array  # of `selves.self_inverse`, flat; not read without a wall
     coupled: Array  # (6N, 6N), the inverse of the resistance with every correction, in units of `layout`
+
+
+@compiled_sums
+def _dot(a: Array, b: Array) -> float:
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total
 
 
 @compiled_sums
@@ -55,20 +63,18 @@ def balance(system: System, r: Array, load: Array, y: Array, u: Array) -> None:
     else:
         y[:] = r
     rigid_parts(at, y, u)
-    short = (load - u).reshape(-1)
-    flat = u.reshape(-1)
-    for i in range(len(short)):
-        total = 0.0
-        for j in range(len(short)):
-            total += system.coupled[i, j] * short[j]
-        flat[i] = total
+    short, flat = load.copy().reshape(-1), u.reshape(-1)
+    for i in range(len(flat)):
+        short[i] -= flat[i]
+    for i in range(len(flat)):
+        flat[i] = _dot(system.coupled[i], short)
     if system.wall:
         add_rigid_columns(at.degrees, at.own, system.inverses, u, y)
     else:
         _add_rigid(at, u, y)
 
 
-@compiled_sums
+@compiled_within
 def _apply(system: System, nothing: Array, y: Array, work: Array, u: Array, out: Array) -> None:
     """Write y less the balanced answer to what all spheres send each other."""
     pair_product(system.at, system.pairs, system.operators, system.wall, y, work)
@@ -79,15 +85,7 @@ def _apply(system: System, nothing: Array, y: Array, work: Array, u: Array, out:
         out[k] = y[k] - out[k]
 
 
-@compiled_sums
-def _dot(a: Array, b: Array) -> float:
-    total = 0.0
-    for k in range(len(a)):
-        total += a[k] * b[k]
-    return total
-
-
-@compiled_sums
+@compiled_within
 def _orthogonalise(basis: Array, k: int, column: Array) -> None:
     """Make row k+1 of the basis orthogonal to the rows before, twice (one pass loses digits), and normalise it."""
     new = basis[k + 1]
@@ -105,7 +103,7 @@ def _orthogonalise(basis: Array, k: int, column: Array) -> None:
             new[e] /= column[k + 1]
 
 
-@compiled_sums
+@compiled_within
 def _rotate(column: Array, rotations: Array, right: Array, k: int) -> None:
     """Bring a new column into the triangle by Givens rotations, and the right-hand side with it."""
     for i in range(k):
@@ -119,7 +117,7 @@ def _rotate(column: Array, rotations: Array, right: Array, k: int) -> None:
     right[k] *= c
 
 
-@compiled_sums
+@compiled_within
 def gmres(system: System, b: Array, tolerance: float, most: int, y: Array) -> tuple[int, float]:
     """Improve y until it is its own balanced answer within a tolerance.
 
@@ -166,7 +164,7 @@ def gmres(system: System, b: Array, tolerance: float, most: int, y: Array) -> tu
             return products, norm / scale
 
 
-@compiled_sums
+@compiled_within
 def _cycle(
     system: System,
     nothing: Array,

@@ -71,13 +71,20 @@ SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, -1.0])
 
 
 @compiled
+def between(centres: Array, i: int, j: int) -> float:
+    """Give the distance of two centres."""
+    x, y, z = centres[i, 0] - centres[j, 0], centres[i, 1] - centres[j, 1], centres[i, 2] - centres[j, 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@compiled
 def rigid_units(radii: Array) -> Array:
     """Give (N, 6): velocities times this are traces y, forces and torques over it sources y, for unit viscosity."""
     out = np.empty((len(radii), 6))
     for i in range(len(radii)):
-        out[i, :3] = math.sqrt(6 * math.pi * radii[i])
-        out[i, 3:] = math.sqrt(8 * math.pi * radii[i] ** 3)
-        out[i] *= SIGNS
+        for k in range(6):
+            size = 6 * math.pi * radii[i] if k < 3 else 8 * math.pi * radii[i] ** 3
+            out[i, k] = SIGNS[k] * math.sqrt(size)
     return out
 
 

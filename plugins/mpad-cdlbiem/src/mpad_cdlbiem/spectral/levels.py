@@ -8,9 +8,9 @@ from attrs import frozen
 from mpad_cdlbiem.spectral.definite import invert
 from mpad_cdlbiem.spectral.degrees import Degrees
 from mpad_cdlbiem.spectral.image import REACH, image_operator
-from mpad_cdlbiem.spectral.isolated import pair_functions_of
+from mpad_cdlbiem.spectral.isolated import subtract_functions
 from mpad_cdlbiem.spectral.krylov import System, rigid_parts
-from mpad_cdlbiem.spectral.layout import W, place, places, rigid_units, spots, strain_unit
+from mpad_cdlbiem.spectral.layout import W, between, place, places, rigid_units, spots, strain_unit
 from mpad_cdlbiem.spectral.pairs import (
     AXIAL,
     SOURCE,
@@ -160,8 +160,7 @@ class Lubrication:
 def _gap(centres: Array, radii: Array, row: Indices) -> tuple[float, float]:
     """Give the radius ratio of a pair and its gap (a+b)/(2ab)."""
     a, b = radii[row[SOURCE]], radii[row[TARGET]]
-    distance = np.sqrt(((centres[row[TARGET]] - centres[row[SOURCE]]) ** 2).sum())
-    return b / a, (distance - a - b) * (a + b) / (2 * a * b)
+    return b / a, (between(centres, row[TARGET], row[SOURCE]) - a - b) * (a + b) / (2 * a * b)
 
 
 @compiled
@@ -174,9 +173,10 @@ def _add_missing(
     row = pairs.rows[k]
     small, large = row[TARGET], row[SOURCE]
     a, b = radii[large], radii[small]
-    offset = centres[small] - centres[large]
-    direction = offset / np.sqrt((offset**2).sum())
-    missing = exact - pair_functions_of(row[TARGET_DEGREE], row[SOURCE_DEGREE], b / a, pairs.axial[row[AXIAL] :])
+    direction, missing = np.empty(3), exact.copy()
+    for x in range(3):
+        direction[x] = (centres[small, x] - centres[large, x]) / between(centres, small, large)
+    subtract_functions(row[TARGET_DEGREE], row[SOURCE_DEGREE], b / a, pairs.axial[row[AXIAL] :], missing)
     strain[0, 2] = strain[2, 0] = 0.5 * shear_rate
     pair_resistance(missing, direction, a, b, 1.0, block)
     pair_strain_load(missing, direction, a, 1.0, strain, extra)

@@ -4,7 +4,7 @@ import numpy as np
 
 from mpad_cdlbiem.spectral.definite import invert
 from mpad_cdlbiem.spectral.image import RAISE
-from mpad_cdlbiem.spectral.layout import lowest, place, places
+from mpad_cdlbiem.spectral.layout import V, W, lowest, place, places
 from mpad_cdlbiem.spectral.translation import axial_blocks, axial_size, count
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled, compiled_sums
@@ -23,11 +23,13 @@ def inverse_size(p: int) -> int:
 def axial_matrix(p: int, q: int, m: int, blocks: Array) -> Array:
     """Give order m of `axial_blocks`, `blocks` starting there, as a matrix: rows and columns V, W, X by degrees."""
     rows, columns = count(p, m), count(q, m)
-    out = np.zeros((3 * rows, 3 * columns))
-    a, b = rows * columns, 4 * rows * columns
-    out[:rows, columns : 2 * columns] = blocks[:a].reshape(rows, columns)
-    out[rows : 2 * rows] = blocks[a:b].reshape(rows, 3 * columns)
-    out[2 * rows :, columns:] = blocks[b : 6 * rows * columns].reshape(rows, 2 * columns)
+    out, at = np.zeros((3 * rows, 3 * columns)), 0
+    for r in range(3 * rows):
+        first = 0 if r // rows == W else columns  # V has W for source, W all three, X has W and X
+        last = 2 * columns if r // rows == V else 3 * columns
+        for c in range(first, last):
+            out[r, c] = blocks[at]
+            at += 1
     return out
 
 
@@ -72,12 +74,13 @@ def self_inverse(p: int, height: float, operator: Array, out: Array) -> bool:
     axial_blocks(p, 1.0, p + RAISE, 1.0, 2 * height, blocks)
     at, to = 0, 0
     for m in range(p + 1):
-        moved = axial_matrix(p, p + RAISE, m, blocks[at:]).T.copy()
-        own = _self_matrix(p, m, moved, operator)
+        own = _self_matrix(p, m, axial_matrix(p, p + RAISE, m, blocks[at:]).T.copy(), operator)
         if not invert(own):
             return False
         size = len(own)
-        out[to : to + size * size] = own.reshape(-1)
+        for r in range(size):
+            for c in range(size):
+                out[to + r * size + c] = own[r, c]
         at, to = at + 6 * count(p, m) * count(p + RAISE, m), to + size * size
     return True
 
