@@ -68,7 +68,7 @@ class CdlBiem:
     tolerance: float = field(default=1e-6, validator=[validators.ge(1e-14), validators.le(1e-2)])
 
     def plan(self, setting: Setting) -> Any:
-        """Import the kernels, and make room for the tables of isolated pairs, which fill as gaps are met."""
+        """Import the kernels; nothing else is worth keeping for a run."""
         if self.discretisation == "elements":
             from mpad_cdlbiem.elements.plan import ElementsPlan
 

@@ -1,7 +1,6 @@
 """Resistance of spheres and the load of the ambient flow on them when held: by elements, and exact for one and two."""
 
 from collections.abc import Iterable
-from functools import lru_cache
 
 import numpy as np
 from attrs import frozen
@@ -77,11 +76,6 @@ def exact_wall(at: Configuration, sphere: int, setting: Setting) -> Friction:
     return Friction(resistance=resistance, load=load)
 
 
-@lru_cache(maxsize=256)
-def _functions(ratio: float) -> PairFunctions:
-    return PairFunctions(ratio)
-
-
 def exact_pair(at: Configuration, pair: list[int], setting: Setting) -> Friction:
     """Give the exact resistance and load of two spheres alone in unbounded fluid, the larger first.
 
@@ -90,7 +84,7 @@ def exact_pair(at: Configuration, pair: list[int], setting: Setting) -> Friction
     (a, b), (x1, x2) = at.radii[pair].tolist(), at.centres[pair]
     apart = x2 - x1
     distance = float(np.linalg.norm(apart))
-    functions = _functions(b / a)((distance - a - b) * (a + b) / (2 * a * b))
+    functions = PairFunctions.of(b / a)((distance - a - b) * (a + b) / (2 * a * b))
     resistance, load, strain, carried = np.empty((12, 12)), np.empty(12), np.zeros((3, 3)), np.zeros((2, 6))
     pair_resistance(functions, apart / distance, a, b, setting.viscosity, resistance)
     strain[0, 2] = strain[2, 0] = setting.shear_rate / 2

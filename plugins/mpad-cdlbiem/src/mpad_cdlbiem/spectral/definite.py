@@ -1,29 +1,36 @@
 """Symmetric positive definite systems of the sizes met here, too small for LAPACK's threads; compiled."""
 
+import numpy as np
+
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled_sums
 
 
 @compiled_sums
 def invert(matrix: Array) -> bool:
-    """Invert a matrix in place, by sweeps of its pivots, and make it symmetric; False if it is not definite."""
+    """Invert a matrix in place, by sweeps of its lower triangle; False if it is not positive definite."""
     n = len(matrix)
+    line = np.empty(n)
     for k in range(n):
         pivot = matrix[k, k]
         if not pivot > 0:
             return False
-        matrix[k, k] = 1.0
-        for c in range(n):
-            matrix[k, c] /= pivot
+        for c in range(k):
+            line[c] = matrix[k, c]
+        for c in range(k, n):
+            line[c] = matrix[c, k]
+        line[k] = 0.0
         for r in range(n):
-            factor = matrix[r, k]
-            if r != k and factor != 0:
-                matrix[r, k] = 0.0
-                for c in range(n):
-                    matrix[r, c] -= factor * matrix[k, c]
+            row, factor = matrix[r], line[r] / pivot
+            if factor != 0:
+                for c in range(r + 1):
+                    row[c] -= factor * line[c]
+        for c in range(n):  # the swept part is minus the inverse
+            matrix[max(c, k), min(c, k)] = line[c] / pivot
+        matrix[k, k] = -1 / pivot
     for r in range(n):
-        for c in range(r):
-            matrix[r, c] = matrix[c, r] = 0.5 * (matrix[r, c] + matrix[c, r])
+        for c in range(r + 1):
+            matrix[r, c] = matrix[c, r] = -matrix[r, c]
     return True
 
 

@@ -94,8 +94,8 @@ def choose(centres: Array, radii: Array, gaps: Array, wall: bool, spread: float,
 
 @compiled
 def fewer(degree: int, least: int) -> int:
-    """Give the degree of the coarse level: an even one (odd and even err differently), two thirds at most."""
-    return max(least, 2 * (degree // 3))
+    """Give the degree of the coarse level: an even one (odd and even err differently), half at most."""
+    return max(least, 2 * (degree // 4))
 
 
 @compiled
@@ -122,12 +122,12 @@ def most_degree(accuracy: float) -> int:
     measured for two and more spheres at the wall, gaps from 1e-3 to 1 radii (1e-2 and 1e-3) and from 0.05 on (1e-4).
     """
     digits = -math.log10(accuracy)
-    return max(4, 2 * math.ceil(digits * digits - 2 * digits + 2))
+    return max(4, 4 * math.ceil(0.5 * digits * digits - 0.5 * digits))
 
 
 @compiled
-def most_degrees(most: int, centres: Array, radii: Array) -> Indices:
-    """Give the highest degree (N,) of each sphere: more for those that have a smaller one near.
+def most_degrees(most: int, radii: Array) -> Indices:
+    """Give the highest degree (N,) of each sphere: more for those that are not the smallest.
 
     Seen from a large sphere, what a small one at its surface does is narrow in proportion to its radius. The pair's own
     resistance is right by lubrication; for a small sphere in the corner between a large one and the wall, the root of
@@ -136,8 +136,7 @@ def most_degrees(most: int, centres: Array, radii: Array) -> Indices:
     out = np.full(len(radii), most)
     for i in range(len(radii)):
         for j in range(len(radii)):
-            apart = between(centres, i, j) - radii[i] - radii[j]
-            if radii[j] < radii[i] and apart < 4 * radii[j]:
+            if radii[j] < radii[i]:
                 out[i] = max(out[i], min(HIGHEST_CHOSEN, int(most * math.sqrt(radii[i] / radii[j]))))
     return out
 
@@ -149,4 +148,4 @@ def extrapolated(fine: Degrees, coarse: Degrees) -> float:
     exp(-α p) at the narrowest gap, and no gain where that is almost closed. The factor before it is measured.
     """
     gained = max(int((fine.spheres - coarse.spheres).max()), 1)
-    return 0.6 * min(1.0, 1 / math.expm1(min(fine.alpha * gained, 50.0)))
+    return 0.25 * min(1.0, 1 / math.expm1(min(fine.alpha * gained, 50.0)))

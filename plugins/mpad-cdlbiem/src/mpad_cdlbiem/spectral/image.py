@@ -11,6 +11,7 @@ r×∇I and of the field of pressure I, written φ, χ and π, of degrees l-2 to
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -127,6 +128,24 @@ def image_operator(p: int, height: float, out: Array) -> None:
                 _in_harmonics(n, l, ordered, mirror * _norm_ratio(n, l, m), out[place(l, m), n - l + RAISE])
 
 
+@lru_cache(maxsize=128)
+def image_terms(p: int) -> Array:
+    """Give (3, T, 5, 3, 3): the coefficients of the `image_operator` as a polynomial in the height, up to degree p."""
+    values = np.empty((3, places(p), REACH, 3, 3))
+    for k, height in enumerate((0.0, 1.0, -1.0)):
+        image_operator(p, height, values[k])
+    zero, up, down = values
+    return np.array([zero, (up - down) / 2, (up + down) / 2 - zero])
+
+
+@compiled_sums
+def image_at(terms: Array, height: float, out: Array) -> None:
+    """Write the `image_operator` (flat) for a height from `image_terms` (3, flat), whose degree may be higher."""
+    constant, slope, bend = terms
+    for k in range(len(out)):
+        out[k] = constant[k] + height * (slope[k] + height * bend[k])
+
+
 @compiled_sums
 def image_of(p: int, operator: Array, y: Array, out: Array) -> None:
     """Write the coefficients (2, 3, T(p+2)) of the image of a source y (2, 3, T(p))."""
@@ -156,8 +175,3 @@ def add_image_transposed(p: int, operator: Array, y: Array, out: Array) -> None:
                         out[c, f, at] += (
                             entries[0, f] * y[c, 0, to] + entries[1, f] * y[c, 1, to] + entries[2, f] * y[c, 2, to]
                         )
-
-
-def image_places(p: int) -> int:
-    """Give the number of (n, m) in the image of a source of degree p."""
-    return places(p + RAISE)

@@ -87,16 +87,17 @@ def _apply(system: System, nothing: Array, y: Array, work: Array, u: Array, out:
 
 @compiled_within
 def _orthogonalise(basis: Array, k: int, column: Array) -> None:
-    """Make row k+1 of the basis orthogonal to the rows before, twice (one pass loses digits), and normalise it."""
+    """Make row k+1 of the basis orthogonal to the rows before, one after the other, and normalise it.
+
+    Modified Gram-Schmidt loses orthogonality, but not the backward stability of GMRES (Paige, Rozložník and Strakoš,
+    SIAM J. Matrix Anal. Appl. 28 (2006) 264).
+    """
     new = basis[k + 1]
-    for i in range(k + 2):
-        column[i] = 0.0
-    for _ in range(2):
-        for i in range(k + 1):
-            part = _dot(basis[i], new)
-            column[i] += part
-            for e in range(len(new)):
-                new[e] -= part * basis[i, e]
+    for i in range(k + 1):
+        row = basis[i]
+        column[i] = _dot(row, new)
+        for e in range(len(new)):
+            new[e] -= column[i] * row[e]
     column[k + 1] = math.sqrt(_dot(new, new))
     if column[k + 1] > 0:
         for e in range(len(new)):
@@ -130,17 +131,17 @@ def gmres(system: System, b: Array, tolerance: float, most: int, y: Array) -> tu
     tolerance
         On the residual over |b|.
     most
-        Products after which to give up.
+        Iterations after which to give up.
     y : (n,)
         First guess; the answer is written here.
 
     Returns
     -------
-    products, residual
+    iterations, residual
     """
     n, nothing = len(b), np.zeros((len(system.at.degrees), 6))
     u, work, residual = np.empty_like(nothing), np.empty(n), np.empty(n)
-    scale, products = math.sqrt(_dot(b, b)), 0
+    scale, iterations = math.sqrt(_dot(b, b)), 0
     if scale == 0:
         y[:] = 0.0
         return 0, 0.0
@@ -151,17 +152,16 @@ def gmres(system: System, b: Array, tolerance: float, most: int, y: Array) -> tu
         residual[:] = b
         if warm:
             _apply(system, nothing, y, work, u, residual)
-            products += 1
             for k in range(n):
                 residual[k] = b[k] - residual[k]
         norm = math.sqrt(_dot(residual, residual))
-        if norm <= tolerance * scale or products >= most:
-            return products, norm / scale
-        done, norm = _cycle(system, nothing, residual, norm, tolerance * scale, most - products, work, u, y)
-        products += done
+        if norm <= tolerance * scale or iterations >= most:
+            return iterations, norm / scale
+        done, norm = _cycle(system, nothing, residual, norm, tolerance * scale, most - iterations, work, u, y)
+        iterations += done
         warm = True
-        if norm <= tolerance * scale:  # the recursion's residual is the true one, with a basis orthogonalised twice
-            return products, norm / scale
+        if norm <= tolerance * scale:  # the recursion's residual is the true one, GMRES being backward stable
+            return iterations, norm / scale
 
 
 @compiled_within

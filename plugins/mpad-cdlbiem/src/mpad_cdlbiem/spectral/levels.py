@@ -7,7 +7,7 @@ from attrs import frozen
 
 from mpad_cdlbiem.spectral.definite import invert
 from mpad_cdlbiem.spectral.degrees import Degrees
-from mpad_cdlbiem.spectral.image import REACH, image_operator
+from mpad_cdlbiem.spectral.image import REACH, image_at, image_terms
 from mpad_cdlbiem.spectral.isolated import subtract_functions
 from mpad_cdlbiem.spectral.krylov import System, rigid_parts
 from mpad_cdlbiem.spectral.layout import W, between, place, places, rigid_units, spots, strain_unit
@@ -41,7 +41,7 @@ class Scene:
 
 
 @compiled
-def _selves_of(at: Places, heights: Array) -> tuple[Array, Array, int]:
+def _selves_of(at: Places, heights: Array, terms: Array) -> tuple[Array, Array, int]:
     """Give image operators and inverses of all spheres, and the first sphere whose matrix is not definite, or -1."""
     size = 0
     for p in at.degrees:
@@ -49,9 +49,10 @@ def _selves_of(at: Places, heights: Array) -> tuple[Array, Array, int]:
     operators, inverses, start = np.empty(at.operator[-1]), np.empty(size), 0
     for i in range(len(at.degrees)):
         p = at.degrees[i]
-        operator = operators[at.operator[i] : at.operator[i + 1]].reshape(places(p), REACH, 3, 3)
-        image_operator(p, heights[i], operator)
-        if not self_inverse(p, heights[i], operator, inverses[start : start + inverse_size(p)]):
+        operator = operators[at.operator[i] : at.operator[i + 1]]
+        image_at(terms, heights[i], operator)
+        shaped = operator.reshape(places(p), REACH, 3, 3)
+        if not self_inverse(p, heights[i], shaped, inverses[start : start + inverse_size(p)]):
             return operators, inverses, i
         start += inverse_size(p)
     return operators, inverses, -1
@@ -106,8 +107,8 @@ class Level:
     units: Array  # (N, 6)
 
     @classmethod
-    def of(cls, scene: Scene, degrees: Degrees, lubrication: "Lubrication") -> "Level":
-        """Form all blocks and corrections.
+    def of(cls, scene: Scene, degrees: Degrees, lubrication: bool) -> "Level":
+        """Form all blocks, and the corrections of spheres alone and of near pairs, if wanted.
 
         Raises
         ------
@@ -118,42 +119,44 @@ class Level:
         pairs = pairs_of(scene.centres, scene.radii, degrees.who, degrees.pairs, scene.wall)
         operators, inverses, bad = np.empty(0), np.empty(0), -1
         if scene.wall:
-            operators, inverses, bad = _selves_of(at, scene.centres[:, 2] / scene.radii)
+            terms = image_terms(int(degrees.spheres.max())).reshape(3, -1)
+            operators, inverses, bad = _selves_of(at, scene.centres[:, 2] / scene.radii, terms)
         if bad >= 0:
             raise FloatingPointError(f"the wall's block of sphere {bad} is not positive definite")
         ambient, resistance, load, units = _alone(
             at, scene.centres, scene.radii, scene.gaps, scene.shear_rate, inverses, scene.wall
         )
-        lubrication.add(scene, degrees, pairs, units, resistance, load)
+        if lubrication:
+            _add_lubrication(scene, degrees, pairs, units, resistance, load)
         if not invert(resistance):
             raise FloatingPointError("the resistance is not positive definite")
         system = System(at, pairs, scene.wall, operators, inverses, resistance)
         return cls(scene=scene, system=system, ambient=ambient, load=load, units=units)
 
 
-@frozen(kw_only=True, eq=False)
-class Lubrication:
-    """What isolated pairs have exactly and truncated harmonics lack.
+def _add_lubrication(
+    scene: Scene, degrees: Degrees, pairs: Pairs, units: Array, resistance: Array, load: Array
+) -> None:
+    """Add what isolated near pairs have exactly and truncated harmonics lack, in the units of `layout`.
 
     F_lub = -ΔR (U - U_∞) + ΔF, ΔR the exact resistance of the isolated pair less that of the same harmonics, ΔF the
     same difference of loads in the ambient strain (Durlofsky, Brady and Bossis, J. Fluid Mech. 180 (1987) 21; Cichocki,
     Jones, Kutteh and Wajnryb, J. Chem. Phys. 112 (2000) 2548). Harmonics are a Galerkin projection, so ΔR is never
     negative.
+
+    Parameters
+    ----------
+    scene, degrees, pairs, units
+        The spheres and their blocks.
+    resistance : (6N, 6N)
+        Of all spheres; changed.
+    load : (N, 6)
+        Changed: ΔR U_∞ + ΔF is added.
     """
-
-    tables: dict[float, PairFunctions]  # by radius ratio; filled when first asked
-    pairs: bool = True
-
-    def add(self, scene: Scene, degrees: Degrees, pairs: Pairs, units: Array, resistance: Array, load: Array) -> None:
-        """Add what near pairs lack to resistance (6N, 6N) and loads (N, 6), both in the units of `layout`."""
-        if not self.pairs:
-            return
-        for k in map(int, np.flatnonzero(degrees.near)):
-            ratio, eps = _gap(scene.centres, scene.radii, pairs.rows[k])
-            if ratio not in self.tables:
-                self.tables[ratio] = PairFunctions(ratio)
-            exact = self.tables[ratio](eps)
-            _add_missing(scene.centres, scene.radii, scene.shear_rate, pairs, k, exact, units, resistance, load)
+    for k in map(int, np.flatnonzero(degrees.near)):
+        ratio, eps = _gap(scene.centres, scene.radii, pairs.rows[k])
+        exact = PairFunctions.of(ratio)(eps)
+        _add_missing(scene.centres, scene.radii, scene.shear_rate, pairs, k, exact, units, resistance, load)
 
 
 @compiled

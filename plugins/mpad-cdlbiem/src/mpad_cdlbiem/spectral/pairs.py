@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpad_cdlbiem.spectral.image import RAISE, REACH, add_image_transposed, image_of
-from mpad_cdlbiem.spectral.layout import lowest, place, places
+from mpad_cdlbiem.spectral.layout import V, W, lowest, place, places
 from mpad_cdlbiem.spectral.translation import axial_blocks, axial_size, count
 from mpad_cdlbiem.spectral.turning import add_turned_back, turn_about_z, turn_blocks, turn_size, turn_start
 from mpad_core.arrays import Array, Indices
@@ -106,24 +106,25 @@ def frame_start(p: int, m: int) -> int:
 @compiled_sums
 def to_frame(p: int, turns: Array, y: Array, out: Array) -> None:
     """Turn coefficients y (2, 3, T) about y into the layout by orders."""
-    for n in range(1, p + 1):
-        width, at, first = n + 1, place(n, 0), 0
+    for n in range(1, p + 1):  # slices of this degree: their indices need no check of sign
+        width, here, first = n + 1, slice(place(n, 0), place(n, 0) + n + 1), 0
+        even_v, even_w, even_x = y[0, 0, here], y[0, 1, here], y[0, 2, here]
+        odd_v, odd_w, odd_x = y[1, 0, here], y[1, 1, here], y[1, 2, here]
         for k in range(width):
-            cosines = turn_start(n) + k * width
-            sines = cosines + width * width
-            v, w, x, odd_v, odd_w, odd_x = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            row = turn_start(n) + k * width
+            cosines, sines = turns[row : row + width], turns[row + width * width : row + width * width + width]
+            v, w, x, other_v, other_w, other_x = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for m in range(width):  # all six at once: short loops cost more than their sums
-                cosine, sine = turns[cosines + m], turns[sines + m]
-                v += cosine * y[0, 0, at + m]
-                w += cosine * y[0, 1, at + m]
-                x += sine * y[0, 2, at + m]
-                odd_v += sine * y[1, 0, at + m]
-                odd_w += sine * y[1, 1, at + m]
-                odd_x += cosine * y[1, 2, at + m]
+                v += cosines[m] * even_v[m]
+                w += cosines[m] * even_w[m]
+                x += sines[m] * even_x[m]
+                other_v += sines[m] * odd_v[m]
+                other_w += sines[m] * odd_w[m]
+                other_x += cosines[m] * odd_x[m]
             have = count(p, k)
             to = first + n - lowest(k)
             out[to], out[to + have], out[to + 2 * have] = v, w, x
-            out[to + 3 * have], out[to + 4 * have], out[to + 5 * have] = odd_v, odd_w, odd_x
+            out[to + 3 * have], out[to + 4 * have], out[to + 5 * have] = other_v, other_w, other_x
             first += 6 * have
 
 
@@ -132,23 +133,23 @@ def from_frame(p: int, turns: Array, z: Array, out: Array) -> None:
     """Undo `to_frame`, by the transpose."""
     out[:, :, : places(p)] = 0.0
     for n in range(1, p + 1):
-        width, at, first = n + 1, place(n, 0), 0
+        width, here, first = n + 1, slice(place(n, 0), place(n, 0) + n + 1), 0
+        even_v, even_w, even_x = out[0, 0, here], out[0, 1, here], out[0, 2, here]
+        odd_v, odd_w, odd_x = out[1, 0, here], out[1, 1, here], out[1, 2, here]
         for k in range(width):
-            cosines = turn_start(n) + k * width
-            sines = cosines + width * width
-            have = count(p, k)
+            row, have = turn_start(n) + k * width, count(p, k)
+            cosines, sines = turns[row : row + width], turns[row + width * width : row + width * width + width]
             of = first + n - lowest(k)
             v, w, x = z[of], z[of + have], z[of + 2 * have]
-            odd_v, odd_w, odd_x = z[of + 3 * have], z[of + 4 * have], z[of + 5 * have]
+            other_v, other_w, other_x = z[of + 3 * have], z[of + 4 * have], z[of + 5 * have]
             first += 6 * have
             for m in range(width):
-                cosine, sine = turns[cosines + m], turns[sines + m]
-                out[0, 0, at + m] += cosine * v
-                out[0, 1, at + m] += cosine * w
-                out[0, 2, at + m] += sine * x
-                out[1, 0, at + m] += sine * odd_v
-                out[1, 1, at + m] += sine * odd_w
-                out[1, 2, at + m] += cosine * odd_x
+                even_v[m] += cosines[m] * v
+                even_w[m] += cosines[m] * w
+                even_x[m] += sines[m] * x
+                odd_v[m] += sines[m] * other_v
+                odd_w[m] += sines[m] * other_w
+                odd_x[m] += cosines[m] * other_x
 
 
 @compiled_sums
@@ -160,19 +161,23 @@ def move_both(p: int, q: int, axial: Array, up: Array, down: Array, onto_up: Arr
     for m in range(min(p, q) + 1):
         rows, columns = count(p, m), count(q, m)
         for f in range(3):  # V has W for source, W all three, X has W and X
-            skip = 0 if f == 1 else columns
-            width = columns if f == 0 else 3 * columns - skip
+            first = s + (0 if f == W else columns)
+            width = s + (2 * columns if f == V else 3 * columns) - first
+            other = first + 3 * columns
+            even, odd = down[first : first + width], down[other : other + width]
+            onto_even, onto_odd = onto_down[first : first + width], onto_down[other : other + width]
             for r in range(t + f * rows, t + (f + 1) * rows):
-                even, odd, other = 0.0, 0.0, r + 3 * rows
-                up_even, up_odd = up[r], up[other]
+                row, up_even, up_odd = axial[at : at + width], up[r], up[r + 3 * rows]
+                of_even, of_odd = 0.0, 0.0
                 for k in range(width):
-                    entry, a, b = axial[at + k], s + skip + k, s + skip + 3 * columns + k
-                    even += entry * down[a]
-                    odd += entry * down[b]
-                    onto_down[a] += entry * up_even
-                    onto_down[b] += entry * up_odd
-                onto_up[r] += even
-                onto_up[other] += odd
+                    of_even += row[k] * even[k]
+                    of_odd += row[k] * odd[k]
+                for k in range(width):  # apart: the compiler cannot know that reading and writing do not overlap
+                    onto_even[k] += row[k] * up_even
+                for k in range(width):
+                    onto_odd[k] += row[k] * up_odd
+                onto_up[r] += of_even
+                onto_up[r + 3 * rows] += of_odd
                 at += width
         t, s = t + 6 * rows, s + 6 * columns
 

@@ -1,18 +1,17 @@
 """From a configuration to velocities: two levels of degrees, whose difference is the estimate of the error."""
 
 import numpy as np
-from attrs import field, frozen
+from attrs import frozen
 
 from mpad_cdlbiem.refusing import refuse_bad, refuse_loads
 from mpad_cdlbiem.spectral.degrees import Degrees, choose, coarser, extrapolated, most_degree, most_degrees, spread_of
 from mpad_cdlbiem.spectral.krylov import solve_columns
 from mpad_cdlbiem.spectral.layout import places
-from mpad_cdlbiem.spectral.levels import Level, Lubrication, Scene
+from mpad_cdlbiem.spectral.levels import Level, Scene
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.compiled import compiled
-from mpad_core.numerics.pair_functions import PairFunctions
 
 MOST_PRODUCTS = 600
 BLOCK = 1e-8
@@ -24,14 +23,13 @@ COARSER = 0.05
 
 @frozen(kw_only=True)
 class SpectralPlan:
-    """The setting, what accuracy is asked for, and the tables of isolated pairs."""
+    """The setting, and what accuracy is asked for."""
 
     setting: Setting
     accuracy: float
     degree: int | None
     lubrication: bool
     tolerance: float
-    tables: dict[float, PairFunctions] = field(factory=dict, eq=False, repr=False)
 
     def prepared(self, configuration: Configuration, guess: Array | None) -> "Prepared":
         """Check the configuration, choose degrees and form the blocks."""
@@ -44,17 +42,16 @@ class SpectralPlan:
             wall=self.setting.wall,
         )
         fine = self._degrees(scene)
-        lubrication = Lubrication(tables=self.tables, pairs=self.lubrication)
         coarse = coarser(fine)
         try:
-            levels = [Level.of(scene, degrees, lubrication) for degrees in (coarse, fine)]
+            levels = [Level.of(scene, degrees, self.lubrication) for degrees in (coarse, fine)]
         except FloatingPointError as error:
             raise RefusedError(f"cdl-biem: {error}") from error
         share = extrapolated(fine, coarse)
         return Prepared(plan=self, coarse=levels[0], fine=levels[1], share=share, guess=guess)
 
     def _degrees(self, scene: Scene) -> Degrees:
-        most = most_degrees(most_degree(self.accuracy), scene.centres, scene.radii)
+        most = most_degrees(most_degree(self.accuracy), scene.radii)
         spread = spread_of(self.accuracy)
         return choose(scene.centres, scene.radii, scene.gaps, scene.wall, spread, most, self.degree or 0)
 
@@ -132,6 +129,8 @@ class Prepared:
         if self.guess is None or self.guess.ndim != 2 or len(self.guess) != columns or self.guess.shape[1] <= n:
             return None
         labels = self.guess[0, :n]
+        if not np.isfinite(self.guess).all():
+            return None
         degrees = labels.astype(np.int64)
         sizes = 3 * (degrees + 1) * (degrees + 2) - 6
         if (degrees != labels).any() or (degrees < 1).any() or sizes.sum() != self.guess.shape[1] - n:
