@@ -396,3 +396,15 @@ def test_refuses_what_has_no_answer(centres, radii, says):
 def test_refuses_loads_that_are_not_finite():
     with pytest.raises(RefusedError, match="loads"):
         motion([[0, 0, 2.0]], [1.0], np.full((1, 6), np.nan))
+
+
+@pytest.mark.parametrize(("height", "degree", "speed", "fits"), [
+    (3.7622, 12, 0.9943563, True),
+    (1.5431, 24, 0.9218740, True),
+    (1.0453, 24, 0.6536183, False),
+])  # fmt: skip
+def test_bare_method_without_lubrication(height, degree, speed, fits):
+    """Without lubrication a lone sphere is what harmonics resolve: all far from the wall, not near contact."""
+    found = motion([[0, 0, height]], [1.0], degree=degree, lubrication=False).velocity[0, 0] / height
+    assert (abs(found / speed - 1) < 2e-7) == fits
+    assert motion([[0, 0, height]], [1.0], degree=4).velocity[0, 0] / height == pytest.approx(speed, rel=2e-7)

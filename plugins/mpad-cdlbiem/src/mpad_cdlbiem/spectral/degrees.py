@@ -148,4 +148,4 @@ def extrapolated(fine: Degrees, coarse: Degrees) -> float:
     exp(-α p) at the narrowest gap, and no gain where that is almost closed. The factor before it is measured.
     """
     gained = max(int((fine.spheres - coarse.spheres).max()), 1)
-    return 0.25 * min(1.0, 1 / math.expm1(min(fine.alpha * gained, 50.0)))
+    return 0.18 * min(1.0, 1 / math.expm1(min(fine.alpha * gained, 50.0)))

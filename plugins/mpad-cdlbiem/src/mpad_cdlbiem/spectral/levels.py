@@ -22,7 +22,7 @@ from mpad_cdlbiem.spectral.pairs import (
     pairs_of,
     places_of,
 )
-from mpad_cdlbiem.spectral.selves import apply_inverse, inverse_size, self_inverse
+from mpad_cdlbiem.spectral.selves import apply_inverse, inverse_size, rigid_resistance, self_inverse
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.pair_functions import PairFunctions, pair_resistance, pair_strain_load
@@ -73,24 +73,30 @@ def _ambient_traces(at: Places, heights: Array, radii: Array, units: Array, shea
 
 @compiled
 def _alone(
-    at: Places, centres: Array, radii: Array, gaps: Array, shear_rate: float, inverses: Array, wall: bool
+    at: Places, centres: Array, radii: Array, gaps: Array, shear_rate: float, inverses: Array, wall: bool, exact: bool
 ) -> tuple[Array, Array, Array, Array]:
     """Give traces of the flow, resistance (6N, 6N) of spheres alone, exact less truncated loads (N, 6), and units.
 
-    In unbounded fluid, harmonics have the lone sphere exactly.
+    In unbounded fluid, harmonics have the lone sphere exactly. At the wall, not `exact` leaves theirs as it is.
     """
     n, units = len(radii), rigid_units(radii)
     ambient = _ambient_traces(at, centres[:, 2], radii, units, shear_rate)
     resistance, load, block = np.eye(6 * n), np.zeros((n, 6)), np.empty((6, 6))
-    if wall:
-        answer, exact = np.empty_like(ambient), np.empty(6)
+    if wall and not exact:
+        start = 0
+        for i in range(n):
+            rigid_resistance(at.degrees[i], inverses[start:], block)
+            resistance[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = block
+            start += inverse_size(at.degrees[i])
+    elif wall:
+        answer, held = np.empty_like(ambient), np.empty(6)
         apply_inverse(at.degrees, at.own, inverses, ambient, answer)  # what the flow does to held spheres
         rigid_parts(at, answer, load)
         for i in range(n):
             wall_resistance(centres[i, 2], gaps[i], radii[i], 1.0, block)
-            wall_shear_load(centres[i, 2], gaps[i], radii[i], 1.0, shear_rate, exact)
+            wall_shear_load(centres[i, 2], gaps[i], radii[i], 1.0, shear_rate, held)
             for k in range(6):
-                load[i, k] = exact[k] / units[i, k] - load[i, k]
+                load[i, k] = held[k] / units[i, k] - load[i, k]
                 for l in range(6):  # noqa: E741
                     resistance[6 * i + k, 6 * i + l] = block[k, l] / (units[i, k] * units[i, l])
     return ambient, resistance, load, units
@@ -124,7 +130,7 @@ class Level:
         if bad >= 0:
             raise FloatingPointError(f"the wall's block of sphere {bad} is not positive definite")
         ambient, resistance, load, units = _alone(
-            at, scene.centres, scene.radii, scene.gaps, scene.shear_rate, inverses, scene.wall
+            at, scene.centres, scene.radii, scene.gaps, scene.shear_rate, inverses, scene.wall, lubrication
         )
         if lubrication:
             _add_lubrication(scene, degrees, pairs, units, resistance, load)

@@ -133,3 +133,16 @@ def add_rigid_columns(degrees: Indices, starts: Indices, inverses: Array, u: Arr
             to += 9 * rows * rows
         for m in range(2, p + 1):
             to += 9 * count(p, m) ** 2
+
+
+@compiled
+def rigid_resistance(p: int, inverse: Array, out: Array) -> None:
+    """Write the resistance (6, 6) of a sphere alone at the wall, as truncated, from its `self_inverse`."""
+    out[:] = 0.0
+    rows = count(p, 0)
+    size = 3 * rows
+    out[2, 2], out[5, 5] = inverse[rows * size + rows], inverse[2 * rows * size + 2 * rows]
+    for axis in range(2):  # along x with the turn about y, along y with that about x
+        spin, w, x = 4 - axis, rows * size + rows, 2 * rows * size + 2 * rows
+        out[axis, axis], out[spin, spin] = inverse[size * size + w], inverse[size * size + x]
+        out[axis, spin] = out[spin, axis] = inverse[size * size + rows * size + 2 * rows]

@@ -17,6 +17,9 @@ MOST_PRODUCTS = 600
 BLOCK = 1e-8
 """Residual for several right-hand sides: together they may be a mobility matrix, to be symmetric to 1e-7."""
 
+FINEST = 1e-8
+"""The highest accuracy."""
+
 COARSER = 0.05
 """The coarse level only tells an error: its iteration may stop at this part of the accuracy."""
 
@@ -52,7 +55,8 @@ class SpectralPlan:
 
     def _degrees(self, scene: Scene) -> Degrees:
         most = most_degrees(most_degree(self.accuracy), scene.radii)
-        spread = spread_of(self.accuracy)
+        # of a degree that is given, what it lacks is added however little it is
+        spread = spread_of(self.accuracy if self.degree is None else FINEST)
         return choose(scene.centres, scene.radii, scene.gaps, scene.wall, spread, most, self.degree or 0)
 
 
