@@ -113,7 +113,6 @@ def image_operator(p: int, height: float, out: Array) -> None:
         Written: for each (l, m) of the source, image degrees l-2 .. l+2, families V W X of image and of source.
     """
     k = np.zeros((3, REACH, 3))
-    ordered = np.empty((3, 3))
     out[:] = 0.0
     for l in range(1, p + 1):  # noqa: E741
         for m in range(l + 1):
@@ -122,10 +121,11 @@ def image_operator(p: int, height: float, out: Array) -> None:
             _of_swirl(l, m, height, k[1])
             _of_pressure(l, m, height, k[2])
             mirror = -1.0 if (l + m) % 2 else 1.0
-            k[1] *= -1.0  # r×∇I is mirrored with the other sign
+            for n in range(REACH):  # r×∇I is mirrored with the other sign
+                for image in range(3):
+                    k[1, n, image] = -k[1, n, image]
             for n in range(max(lowest(m), l - RAISE), l + RAISE + 1):
-                ordered[:] = k[:, n - l + RAISE]
-                _in_harmonics(n, l, ordered, mirror * _norm_ratio(n, l, m), out[place(l, m), n - l + RAISE])
+                _in_harmonics(n, l, k[:, n - l + RAISE], mirror * _norm_ratio(n, l, m), out[place(l, m), n - l + RAISE])
 
 
 @lru_cache(maxsize=128)

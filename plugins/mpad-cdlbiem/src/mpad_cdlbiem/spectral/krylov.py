@@ -61,7 +61,8 @@ def balance(system: System, r: Array, load: Array, y: Array, u: Array) -> None:
     if system.wall:
         apply_inverse(at.degrees, at.own, system.inverses, r, y)
     else:
-        y[:] = r
+        for k in range(len(r)):
+            y[k] = r[k]
     rigid_parts(at, y, u)
     short, flat = load.copy().reshape(-1), u.reshape(-1)
     for i in range(len(flat)):
@@ -149,7 +150,8 @@ def gmres(system: System, b: Array, tolerance: float, most: int, y: Array) -> tu
     for k in range(n):
         warm = warm or y[k] != 0
     while True:
-        residual[:] = b
+        for k in range(n):
+            residual[k] = b[k]
         if warm:
             _apply(system, nothing, y, work, u, residual)
             for k in range(n):
@@ -180,7 +182,8 @@ def _cycle(
     length = min(most, RESTART)
     basis, triangle = np.empty((length + 1, len(residual))), np.zeros((length, length + 1))
     rotations, right = np.empty((length, 2)), np.zeros(length + 1)
-    basis[0] = residual / norm
+    for e in range(len(residual)):
+        basis[0, e] = residual[e] / norm
     right[0] = norm
     used = 0
     while used < length and abs(right[used]) > goal:

@@ -85,8 +85,8 @@ def _alone(
     if wall and not exact:
         start = 0
         for i in range(n):
-            rigid_resistance(at.degrees[i], inverses[start:], block)
-            resistance[6 * i : 6 * i + 6, 6 * i : 6 * i + 6] = block
+            own = resistance[6 * i : 6 * i + 6, 6 * i : 6 * i + 6]
+            rigid_resistance(at.degrees[i], inverses[start:], own)
             start += inverse_size(at.degrees[i])
     elif wall:
         answer, held = np.empty_like(ambient), np.empty(6)

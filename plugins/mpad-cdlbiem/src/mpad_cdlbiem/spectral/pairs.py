@@ -200,6 +200,22 @@ def workspace(degrees: Indices) -> tuple[Array, Array]:
 
 
 @compiled_sums
+def _copy(y: Array, out: Array) -> None:
+    for c in range(2):
+        for f in range(3):
+            for k in range(y.shape[2]):  # numpy's assignment would compile the message of its error, for seconds
+                out[c, f, k] = y[c, f, k]
+
+
+@compiled_sums
+def _add(y: Array, out: Array) -> None:
+    for c in range(2):
+        for f in range(3):
+            for k in range(y.shape[2]):
+                out[c, f, k] += y[c, f, k]
+
+
+@compiled_sums
 def pair_product(at: Places, pairs: Pairs, operators: Array, wall: bool, y: Array, out: Array) -> None:
     """Write what every sphere gets from all others, directly and by their images.
 
@@ -224,7 +240,7 @@ def pair_product(at: Places, pairs: Pairs, operators: Array, wall: bool, y: Arra
         source = y[at.own[j] : at.own[j + 1]].reshape(2, 3, tj)
         onto_source = out[at.own[j] : at.own[j + 1]].reshape(2, 3, tj)
         turn_about_z(p, cosine, sine, y[at.own[i] : at.own[i + 1]].reshape(2, 3, ti), z[0])
-        z[2] = z[0]
+        _copy(z[0], z[2])
         turn_about_z(q, cosine, sine, source, z[1])
         exchange(p, q, pairs.turns[row[TURNS] :], pairs.axial[row[AXIAL] :], z[0], z[1], work)
         add_turned_back(q, cosine, sine, z[1], onto_source)
@@ -234,7 +250,7 @@ def pair_product(at: Places, pairs: Pairs, operators: Array, wall: bool, y: Arra
             turn_about_z(q + RAISE, cosine, sine, z[3], z[1])
             turns, axial = pairs.turns[row[WALL_TURNS] :], pairs.axial[row[WALL_AXIAL] :]
             exchange(p, q + RAISE, turns, axial, z[2], z[1], work)
-            z[0] += z[2]
+            _add(z[2], z[0])
             z[3] = 0.0
             add_turned_back(q + RAISE, cosine, sine, z[1], z[3])
             add_image_transposed(q, operator, z[3], onto_source)
