@@ -5,6 +5,7 @@ import pytest
 
 from mpad_cdlbiem.spectral import quadrature
 from mpad_cdlbiem.spectral.image import RAISE, image_of, image_operator
+from mpad_cdlbiem.spectral.isolated import subtract_functions
 from mpad_cdlbiem.spectral.layout import SIGNS, W, X, lowest, place, places, rigid_units, spots, strain_unit
 from mpad_cdlbiem.spectral.pairs import pair_product, pairs_of, places_of
 from mpad_cdlbiem.spectral.selves import add_rigid_columns, apply_inverse, axial_matrix, inverse_size, self_inverse
@@ -296,3 +297,13 @@ def radii_of_iteration(p, gap):
 )
 def test_spectral_radii_at_the_wall(gap, p, deflated, coupling, error):
     close(radii_of_iteration(p, gap), [deflated, coupling], error)
+
+
+def test_harmonics_of_degree_one_do_not_see_strain():
+    """The coarse level may have no more: what it has of the loads in strain is nothing, not something else."""
+    axial = np.empty(axial_size(1, 1))
+    axial_blocks(1, 1.0, 1, 1.0, 2.1, axial)
+    functions = np.zeros(22)
+    subtract_functions(1, 1, 1.0, axial, functions)
+    assert (functions[16:] == 0).all()
+    assert (functions[[0, 2, 6, 10]] < -6 * np.pi).all()  # each held sphere adds to the other's drag

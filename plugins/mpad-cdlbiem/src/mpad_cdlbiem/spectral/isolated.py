@@ -34,7 +34,10 @@ def _answers(
     right = np.zeros((3 * (one + two), 5))
     for k in range(4):
         right[spots[k], k] = 1.0
-    right[one + 1, 4], right[3 * one + two + 1, 4] = strain, other_strain
+    if one > 1:  # harmonics of degree 1 do not see strain
+        right[one + 1, 4] = strain
+    if two > 1:
+        right[3 * one + two + 1, 4] = other_strain
     resistance, load = np.empty((4, 4)), np.empty(4)
     definite = 1.0 if solve(_both(p, q, m, axial), right) else np.nan
     for k in range(4):
@@ -51,7 +54,7 @@ def subtract_functions(p: int, q: int, ratio: float, axial: Array, out: Array) -
     Parameters
     ----------
     p, q
-        Highest degrees of sphere 2, the target of `axial`, and of sphere 1, its source; at least 2.
+        Highest degrees of sphere 2, the target of `axial`, and of sphere 1, its source.
     ratio
         Radius of sphere 2 over that of sphere 1; the functions are for radius 1 and viscosity 1.
     axial

@@ -13,7 +13,9 @@ from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.compiled import compiled
 
-MOST_PRODUCTS = 600
+MOST = 600
+"""Iterations after which a solve is given up."""
+
 BLOCK = 1e-8
 """Residual for several right-hand sides: together they may be a mobility matrix, to be symmetric to 1e-7."""
 
@@ -94,15 +96,15 @@ class Prepared:
         n = len(self.fine.scene.radii)
         columns = np.moveaxis(loads.reshape(n, 6, -1), 2, 0) / self.plan.setting.viscosity
         start = self._start(len(columns))
-        known = start is not None
-        rough = np.zeros((len(columns), self.coarse.system.at.own[-1]))
-        if start is not None:
+        if start is None:
+            rough = np.zeros((len(columns), self.coarse.system.at.own[-1]))
+        else:
             rough = _between(self.fine, self.coarse, start)
         tolerance = self.plan.tolerance if len(columns) == 1 else min(self.plan.tolerance, BLOCK)
         lower, _, _ = self._solved(self.coarse, columns, rough, max(COARSER * self.plan.accuracy, self.plan.tolerance))
-        y = start if known and start is not None else _between(self.coarse, self.fine, rough)
-        velocity, products, residual = self._solved(self.fine, columns, y, tolerance)
-        report = Report(error=self._error(velocity, lower) + 0.1 * residual, iterations=products, residual=residual)
+        y = _between(self.coarse, self.fine, rough) if start is None else start
+        velocity, iterations, residual = self._solved(self.fine, columns, y, tolerance)
+        report = Report(error=self._error(velocity, lower) + 0.1 * residual, iterations=iterations, residual=residual)
         motion = np.moveaxis(velocity, 0, 2).reshape(loads.shape)
         return Motion(velocity=motion, report=report, guess=np.hstack([self._labels(len(y)), y]))
 
@@ -110,10 +112,10 @@ class Prepared:
         """Solve at one level; `y` is the first guess and becomes the answer. Velocities (K, N, 6)."""
         u = np.empty(columns.shape)
         loads = np.ascontiguousarray(columns / level.units + level.load)
-        products, residual = solve_columns(level.system, level.ambient, loads, tolerance, MOST_PRODUCTS, y, u)
+        iterations, residual = solve_columns(level.system, level.ambient, loads, tolerance, MOST, y, u)
         if not residual <= tolerance:
-            raise RefusedError(f"cdl-biem: no convergence: residual {residual:.2g} after {products} products")
-        return u / level.units, products, residual
+            raise RefusedError(f"cdl-biem: no convergence: residual {residual:.2g} after {iterations} iterations")
+        return u / level.units, iterations, residual
 
     def _error(self, velocity: Array, lower: Array) -> float:
         """Estimate the relative error of (U, aΩ) by what the last degrees changed; the worst of all columns."""
