@@ -4,13 +4,19 @@ import numpy as np
 import pytest
 
 from mpad_cdlbiem.spectral import quadrature
-from mpad_cdlbiem.spectral.image import RAISE, image_of, image_operator
-from mpad_cdlbiem.spectral.isolated import subtract_functions
-from mpad_cdlbiem.spectral.layout import SIGNS, W, X, lowest, place, places, rigid_units, spots, strain_unit
-from mpad_cdlbiem.spectral.pairs import pair_product, pairs_of, places_of
-from mpad_cdlbiem.spectral.selves import add_rigid_columns, apply_inverse, axial_matrix, inverse_size, self_inverse
-from mpad_cdlbiem.spectral.translation import HIGHEST, axial_blocks, axial_size, count
-from mpad_cdlbiem.spectral.turning import turn_blocks, turn_size, turn_start
+from mpad_core.numerics.harmonics.image import RAISE, image_of, image_operator
+from mpad_core.numerics.harmonics.isolated import subtract_functions
+from mpad_core.numerics.harmonics.layout import SIGNS, W, X, lowest, place, places, rigid_units, spots, strain_unit
+from mpad_core.numerics.harmonics.pairs import pair_product, pairs_of, places_of
+from mpad_core.numerics.harmonics.selves import (
+    add_rigid_columns,
+    apply_inverse,
+    axial_matrix,
+    inverse_size,
+    self_inverse,
+)
+from mpad_core.numerics.harmonics.translation import HIGHEST, axial_blocks, axial_size, count
+from mpad_core.numerics.harmonics.turning import turn_blocks, turn_size, turn_start
 
 DIRECTIONS = [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, -1, 0), (-1, 0.3, -0.05), (0.5, 0.8, 0.9), (-0.2, -0.4, -1)]
 

@@ -13,12 +13,12 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from mpad_cdlbiem.spectral.image import RAISE, REACH, image_of
-from mpad_cdlbiem.spectral.layout import V, W, X, place, places, strain_unit, unit
-from mpad_cdlbiem.spectral.levels import Level
-from mpad_cdlbiem.spectral.translation import UNITS
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.harmonics.image import RAISE, REACH, image_of
+from mpad_core.numerics.harmonics.layout import V, W, X, place, places, strain_unit, unit
+from mpad_core.numerics.harmonics.levels import Level
+from mpad_core.numerics.harmonics.translation import UNITS
 
 Numbers = npt.NDArray[np.complex128]
 

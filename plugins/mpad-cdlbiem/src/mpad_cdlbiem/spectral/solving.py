@@ -4,14 +4,22 @@ import numpy as np
 from attrs import frozen
 
 from mpad_cdlbiem.refusing import refuse_bad, refuse_loads
-from mpad_cdlbiem.spectral.degrees import Degrees, choose, coarser, extrapolated, most_degree, most_degrees, spread_of
-from mpad_cdlbiem.spectral.krylov import solve_columns
-from mpad_cdlbiem.spectral.layout import places
-from mpad_cdlbiem.spectral.levels import Level, Scene
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.harmonics.degrees import (
+    Degrees,
+    choose,
+    coarser,
+    extrapolated,
+    most_degree,
+    most_degrees,
+    spread_of,
+)
+from mpad_core.numerics.harmonics.krylov import solve_columns
+from mpad_core.numerics.harmonics.layout import places
+from mpad_core.numerics.harmonics.levels import Level, Scene
 
 MOST = 600
 """Iterations after which a solve is given up."""

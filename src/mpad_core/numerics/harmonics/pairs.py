@@ -15,12 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.image import RAISE, REACH, add_image_transposed, image_of
-from mpad_cdlbiem.spectral.layout import V, W, lowest, place, places
-from mpad_cdlbiem.spectral.translation import axial_blocks, axial_size, count
-from mpad_cdlbiem.spectral.turning import add_turned_back, turn_about_z, turn_blocks, turn_size, turn_start
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled, compiled_sums
+from mpad_core.numerics.harmonics.image import RAISE, REACH, add_image_transposed, image_of
+from mpad_core.numerics.harmonics.layout import V, W, lowest, place, places
+from mpad_core.numerics.harmonics.translation import axial_blocks, axial_size, count
+from mpad_core.numerics.harmonics.turning import add_turned_back, turn_about_z, turn_blocks, turn_size, turn_start
 
 TARGET, SOURCE, TARGET_DEGREE, SOURCE_DEGREE, TURNS, AXIAL, WALL_TURNS, WALL_AXIAL = range(8)
 """Columns of `Pairs.rows`."""

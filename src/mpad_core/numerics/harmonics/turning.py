@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.layout import lowest, place
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled, compiled_sums
+from mpad_core.numerics.harmonics.layout import lowest, place
 
 
 @compiled

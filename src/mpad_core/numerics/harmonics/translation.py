@@ -20,9 +20,9 @@ import math
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.layout import V, W, X, lowest, unit
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.harmonics.layout import V, W, X, lowest, unit
 
 HIGHEST = 250
 """Highest degree: the factorials' products stay within the range of floating point for all gaps of use."""

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.layout import spots
-from mpad_cdlbiem.spectral.pairs import Pairs, Places, pair_product
-from mpad_cdlbiem.spectral.selves import add_rigid_columns, apply_inverse
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled_sums, compiled_within
+from mpad_core.numerics.harmonics.layout import spots
+from mpad_core.numerics.harmonics.pairs import Pairs, Places, pair_product
+from mpad_core.numerics.harmonics.selves import add_rigid_columns, apply_inverse
 
 RESTART = 60
 """Length of a cycle."""

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.definite import solve
-from mpad_cdlbiem.spectral.layout import strain_unit
-from mpad_cdlbiem.spectral.selves import axial_matrix
-from mpad_cdlbiem.spectral.translation import count
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled, compiled_within
+from mpad_core.numerics.harmonics.definite import solve
+from mpad_core.numerics.harmonics.layout import strain_unit
+from mpad_core.numerics.harmonics.selves import axial_matrix
+from mpad_core.numerics.harmonics.translation import count
 
 
 @compiled_within

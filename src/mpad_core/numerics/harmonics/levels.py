@@ -5,13 +5,15 @@ import math
 import numpy as np
 from attrs import frozen
 
-from mpad_cdlbiem.spectral.definite import invert
-from mpad_cdlbiem.spectral.degrees import Degrees
-from mpad_cdlbiem.spectral.image import REACH, image_at, image_terms
-from mpad_cdlbiem.spectral.isolated import subtract_functions
-from mpad_cdlbiem.spectral.krylov import System, rigid_parts
-from mpad_cdlbiem.spectral.layout import W, between, place, places, rigid_units, spots, strain_unit
-from mpad_cdlbiem.spectral.pairs import (
+from mpad_core.arrays import Array, Indices
+from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.harmonics.definite import invert
+from mpad_core.numerics.harmonics.degrees import Degrees
+from mpad_core.numerics.harmonics.image import REACH, image_at, image_terms
+from mpad_core.numerics.harmonics.isolated import subtract_functions
+from mpad_core.numerics.harmonics.krylov import System, rigid_parts
+from mpad_core.numerics.harmonics.layout import W, between, place, places, rigid_units, spots, strain_unit
+from mpad_core.numerics.harmonics.pairs import (
     AXIAL,
     SOURCE,
     SOURCE_DEGREE,
@@ -22,9 +24,7 @@ from mpad_cdlbiem.spectral.pairs import (
     pairs_of,
     places_of,
 )
-from mpad_cdlbiem.spectral.selves import apply_inverse, inverse_size, rigid_resistance, self_inverse
-from mpad_core.arrays import Array, Indices
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.harmonics.selves import apply_inverse, inverse_size, rigid_resistance, self_inverse
 from mpad_core.numerics.pair_functions import PairFunctions, pair_resistance, pair_strain_load
 from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
 

@@ -15,10 +15,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.layout import lowest, place, places
-from mpad_cdlbiem.spectral.translation import UNITS
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled, compiled_sums
+from mpad_core.numerics.harmonics.layout import lowest, place, places
+from mpad_core.numerics.harmonics.translation import UNITS
 
 RAISE = 2
 """An image goes this many degrees higher than its source."""

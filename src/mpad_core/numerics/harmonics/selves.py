@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.definite import invert
-from mpad_cdlbiem.spectral.image import RAISE
-from mpad_cdlbiem.spectral.layout import V, W, lowest, place, places
-from mpad_cdlbiem.spectral.translation import axial_blocks, axial_size, count
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled, compiled_sums
+from mpad_core.numerics.harmonics.definite import invert
+from mpad_core.numerics.harmonics.image import RAISE
+from mpad_core.numerics.harmonics.layout import V, W, lowest, place, places
+from mpad_core.numerics.harmonics.translation import axial_blocks, axial_size, count
 
 
 @compiled

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mpad_cdlbiem.spectral.layout import between
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.harmonics.layout import between
 
 LEAST_OF_SPHERES, LEAST_OF_PAIRS = 3, 2
 """One more than the coarse level must have: shear drives degree 2 of a sphere, and pairs feel each other's forces."""
