@@ -38,6 +38,7 @@ __all__ = [
     "STRAIN_ACROSS",
     "STRAIN_ALONG",
     "PairFunctions",
+    "exact_functions",
     "pair_resistance",
     "pair_strain_load",
 ]
@@ -185,6 +186,36 @@ class PairFunctions:
             piece = _lubrication(self.ratio) if octave < NEAREST else _octave(self.ratio, octave)
             self._pieces[octave] = piece
         return piece
+
+
+TABLES = 64
+"""Ratios of radii among many pairs up to which each gets its look-up; beyond, the series is summed for every pair."""
+
+
+def exact_functions(ratios: Array, gaps: Array) -> Array:
+    """Give the functions (K, 22) of `PairFunctions` for many pairs.
+
+    Parameters
+    ----------
+    ratios : (K,)
+        Smaller radius over larger.
+    gaps : (K,)
+        Times (a+b)/(2ab); NaN comes of those that are not positive.
+    """
+    listed = ratios.tolist()
+    if len(set(listed)) <= TABLES:
+        each = [PairFunctions.of(ratio)(gap) for ratio, gap in zip(listed, gaps.tolist(), strict=True)]
+        return np.array(each).reshape(-1, SIZE)
+    return np.array([_summed(*pair) for pair in zip(listed, gaps.tolist(), strict=True)])
+
+
+def _summed(ratio: float, eps: float) -> Array:
+    """Give the functions without filling an octave, where the series converges."""
+    if not 2.0**NEAREST <= eps < 2.0**FARTHEST:
+        return PairFunctions.of(ratio)(eps)
+    f = regular_functions(ratio, eps)
+    whole_functions(ratio, eps, f)
+    return f
 
 
 @lru_cache(maxsize=1024)  # as many ratios as there are pairs of kinds; a full table is 0.2 MB

@@ -7,6 +7,7 @@ import numpy as np
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Setting
+from mpad_core.numerics.neighbours import closest_pair
 
 
 def refuse_bad(configuration: Configuration, setting: Setting) -> None:
@@ -22,11 +23,9 @@ def refuse_bad(configuration: Configuration, setting: Setting) -> None:
     _refuse("radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
     if setting.wall:
         _refuse("gap {} µm: it touches or cuts the wall", gaps, ~((gaps > 0) & np.isfinite(gaps)))
-    i, j = np.triu_indices(len(radii), 1)
-    between = np.linalg.norm(centres[i] - centres[j], axis=1) - radii[i] - radii[j]
-    if not (between > 0).all():
-        k = int(np.argmin(between))
-        raise RefusedError(f"cdl-biem: spheres {i[k]} and {j[k]}: gap {between[k]} µm: they touch or overlap")
+    i, j, gap = closest_pair(centres, radii)
+    if not gap > 0:
+        raise RefusedError(f"cdl-biem: spheres {i} and {j}: gap {gap} µm: they touch or overlap")
 
 
 def refuse_loads(loads: Array) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled_sums, compiled_within
+from mpad_core.numerics.harmonics.factors import Factors, solve_factored
+from mpad_core.numerics.harmonics.far import Far, add_far
 from mpad_core.numerics.harmonics.layout import spots
 from mpad_core.numerics.harmonics.pairs import Pairs, Places, pair_product
 from mpad_core.numerics.harmonics.selves import add_rigid_columns, apply_inverse
@@ -20,10 +22,11 @@ class System(NamedTuple):
 
     at: Places
     pairs: Pairs
+    far: Far  # of pairs that are not among `pairs`
     wall: bool
     operators: Array  # image operators, flat
     inverses: Array  # of `selves.self_inverse`, flat; not read without a wall
-    coupled: Array  # (6N, 6N), the inverse of the resistance with every correction, in units of `layout`
+    coupled: Factors  # of the resistance (6N, 6N) with every correction, in units of `layout`
 
 
 @compiled_sums
@@ -67,18 +70,24 @@ def balance(system: System, r: Array, load: Array, y: Array, u: Array) -> None:
     short, flat = load.copy().reshape(-1), u.reshape(-1)
     for i in range(len(flat)):
         short[i] -= flat[i]
-    for i in range(len(flat)):
-        flat[i] = _dot(system.coupled[i], short)
+    solve_factored(system.coupled, short, flat)
     if system.wall:
         add_rigid_columns(at.degrees, at.own, system.inverses, u, y)
     else:
         _add_rigid(at, u, y)
 
 
+@compiled_sums
+def exchanged(system: System, y: Array, out: Array) -> None:
+    """Write the traces of what every sphere gets from all others."""
+    pair_product(system.at, system.pairs, system.operators, system.wall, y, out)
+    add_far(system.at, system.far, system.wall, y, out)
+
+
 @compiled_within
 def _apply(system: System, nothing: Array, y: Array, work: Array, u: Array, out: Array) -> None:
     """Write y less the balanced answer to what all spheres send each other."""
-    pair_product(system.at, system.pairs, system.operators, system.wall, y, work)
+    exchanged(system, y, work)
     for k in range(len(work)):
         work[k] = -work[k]
     balance(system, work, nothing, out, u)
@@ -232,7 +241,7 @@ def solve_columns(
         balance(system, -ambient, loads[k], b, u[k])
         done, left = gmres(system, b, tolerance, most, y[k])
         products, residual = max(products, done), max(residual, left)
-        pair_product(system.at, system.pairs, system.operators, system.wall, y[k], work)
+        exchanged(system, y[k], work)
         for e in range(len(work)):
             work[e] = -work[e] - ambient[e]
         balance(system, work, loads[k], y[k], u[k])

@@ -89,7 +89,7 @@ def flow_at(level: Level, sources: Array, points: Array) -> Array:
     scene, at = level.scene, level.system.at
     points = np.ascontiguousarray(points, dtype=np.float64)
     out = np.zeros_like(points)
-    out[:, 0] = scene.shear_rate * points[:, 2]
+    out[:, 0] = scene.flow.rate * points[:, 2]
     for i, p in enumerate(at.degrees):
         y = sources[at.own[i] : at.own[i + 1]].reshape(2, 3, -1)
         centre, radius = scene.centres[i], float(scene.radii[i])

@@ -4,10 +4,9 @@ import numpy as np
 from attrs import frozen
 
 from mpad_cdlbiem.refusing import refuse_bad, refuse_loads
-from mpad_core.arrays import Array, Indices
+from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
-from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.harmonics.degrees import (
     Degrees,
     choose,
@@ -18,8 +17,8 @@ from mpad_core.numerics.harmonics.degrees import (
     spread_of,
 )
 from mpad_core.numerics.harmonics.krylov import solve_columns
-from mpad_core.numerics.harmonics.layout import places
-from mpad_core.numerics.harmonics.levels import Level, Scene
+from mpad_core.numerics.harmonics.levels import Flow, Level, Scene
+from mpad_core.numerics.harmonics.warm import between, kept, started
 
 MOST = 600
 """Iterations after which a solve is given up."""
@@ -51,7 +50,7 @@ class SpectralPlan:
             centres=configuration.centres,
             radii=configuration.radii,
             gaps=configuration.wall_gaps,
-            shear_rate=self.setting.shear_rate,
+            flow=Flow(self.setting.shear_rate, self.setting.shear_rate),
             wall=self.setting.wall,
         )
         fine = self._degrees(scene)
@@ -70,24 +69,6 @@ class SpectralPlan:
         return choose(scene.centres, scene.radii, scene.gaps, scene.wall, spread, most, self.degree or 0)
 
 
-@compiled
-def _copied(degrees: Indices, starts: Indices, y: Array, to_degrees: Indices, to_starts: Indices) -> Array:
-    """Give coefficients (K, n) laid out for other degrees: the higher ones are dropped, or zero."""
-    out = np.zeros((len(y), to_starts[-1]))
-    for i in range(len(degrees)):
-        t, to = places(degrees[i]), places(to_degrees[i])
-        common = min(t, to)
-        for row in range(6):
-            of, at = starts[i] + row * t, to_starts[i] + row * to
-            out[:, at : at + common] = y[:, of : of + common]
-    return out
-
-
-def _between(source: Level, target: Level, y: Array) -> Array:
-    a, b = source.system.at, target.system.at
-    return _copied(a.degrees, a.own, y, b.degrees, b.own)
-
-
 @frozen(kw_only=True, eq=False)
 class Prepared:
     """A configuration at the degrees that answer, and at the lower ones that tell how good the answer is."""
@@ -103,18 +84,18 @@ class Prepared:
         refuse_loads(loads)
         n = len(self.fine.scene.radii)
         columns = np.moveaxis(loads.reshape(n, 6, -1), 2, 0) / self.plan.setting.viscosity
-        start = self._start(len(columns))
+        start = started(self.guess, len(columns), self.fine.system.at)
         if start is None:
             rough = np.zeros((len(columns), self.coarse.system.at.own[-1]))
         else:
-            rough = _between(self.fine, self.coarse, start)
+            rough = between(self.fine.system.at, self.coarse.system.at, start)
         tolerance = self.plan.tolerance if len(columns) == 1 else min(self.plan.tolerance, BLOCK)
         lower, _, _ = self._solved(self.coarse, columns, rough, max(COARSER * self.plan.accuracy, self.plan.tolerance))
-        y = _between(self.coarse, self.fine, rough) if start is None else start
+        y = between(self.coarse.system.at, self.fine.system.at, rough) if start is None else start
         velocity, iterations, residual = self._solved(self.fine, columns, y, tolerance)
         report = Report(error=self._error(velocity, lower) + 0.1 * residual, iterations=iterations, residual=residual)
         motion = np.moveaxis(velocity, 0, 2).reshape(loads.shape)
-        return Motion(velocity=motion, report=report, guess=np.hstack([self._labels(len(y)), y]))
+        return Motion(velocity=motion, report=report, guess=kept(self.fine.system.at, y))
 
     def _solved(self, level: Level, columns: Array, y: Array, tolerance: float) -> tuple[Array, int, float]:
         """Solve at one level; `y` is the first guess and becomes the answer. Velocities (K, N, 6)."""
@@ -132,25 +113,6 @@ class Prepared:
         change = np.sqrt((((velocity - lower) * scale) ** 2).sum(axis=(1, 2)))
         size = np.sqrt(((velocity * scale) ** 2).sum(axis=(1, 2)))
         return self.share * float(np.max(np.divide(change, size, out=np.zeros_like(size), where=size > 0), initial=0.0))
-
-    def _labels(self, columns: int) -> Array:
-        return np.broadcast_to(self.fine.system.at.degrees.astype(float), (columns, len(self.fine.scene.radii)))
-
-    def _start(self, columns: int) -> Array | None:
-        """Give the guess at this level's degrees, if it is one for as many spheres and right-hand sides."""
-        at = self.fine.system.at
-        n = len(at.degrees)
-        if self.guess is None or self.guess.ndim != 2 or len(self.guess) != columns or self.guess.shape[1] <= n:
-            return None
-        labels = self.guess[0, :n]
-        if not np.isfinite(self.guess).all():
-            return None
-        degrees = labels.astype(np.int64)
-        sizes = 3 * (degrees + 1) * (degrees + 2) - 6
-        if (degrees != labels).any() or (degrees < 1).any() or sizes.sum() != self.guess.shape[1] - n:
-            return None
-        starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
-        return _copied(degrees, starts, np.ascontiguousarray(self.guess[:, n:]), at.degrees, at.own)
 
     def flow(self, motion: Motion, points: Array) -> Array:
         """Give the fluid's velocity (n, 3) at points (n, 3)."""

@@ -1,0 +1,59 @@
+"""How wrong the answer may be, by the size of the last moments; compiled.
+
+What the moments above a sphere's degree p would add is judged by those of degree p in the solution: of a sphere with
+near neighbours by themselves, of one without by what other spheres make of them, since alone it is exact by its
+correction. In the units of `harmonics.layout`, in which squares are energies, the relative error is SHARE of their
+norm over that of the velocities. Measured for two spheres above the wall (radii to 5:1, gaps 1e-3 to 1, any
+orientation; shear, loads, both): the truth is below the estimate in 98 % of cases, and a third of it in the median.
+"""
+
+import math
+
+import numpy as np
+
+from mpad_core.arrays import Array, Indices
+from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.harmonics.krylov import System, balance
+from mpad_core.numerics.harmonics.layout import place, places
+
+SHARE = 0.045
+
+LEAST = 1e-10
+"""Of the exact functions, all that a lone sphere has."""
+
+
+@compiled
+def _last_moments(p: int, own: Array) -> float:
+    """Give the square of the norm of the coefficients of degree p of one sphere (flat)."""
+    t, total = places(p), 0.0
+    for row in range(6):
+        for m in range(p + 1):
+            total += own[row * t + place(p, m)] ** 2
+    return total
+
+
+@compiled
+def error_of(system: System, ambient: Array, load: Array, y: Array, u: Array, lonely: Indices) -> float:
+    """Estimate the relative error of one column.
+
+    Parameters
+    ----------
+    system, ambient, load
+        As `krylov.solve_columns` has them; load (N, 6).
+    y, u : (n,), (N, 6)
+        The solution.
+    lonely : (N,)
+        1 for spheres without near neighbours.
+    """
+    at, alone, motion = system.at, np.empty_like(y), np.empty_like(u)
+    balance(system, -ambient, load, alone, motion)
+    missed, size = 0.0, 0.0
+    for i in range(len(lonely)):
+        own = y[at.own[i] : at.own[i + 1]].copy()
+        if lonely[i]:
+            for k in range(len(own)):
+                own[k] -= alone[at.own[i] + k]
+        missed += _last_moments(at.degrees[i], own)
+        for k in range(6):
+            size += u[i, k] * u[i, k]
+    return max(LEAST, SHARE * math.sqrt(missed / size)) if size > 0 else 0.0
