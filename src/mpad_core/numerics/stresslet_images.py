@@ -55,31 +55,34 @@ class Harmonics(NamedTuple):
 
 
 class Mutual(NamedTuple):
-    """Couplings of like with like: along and across the line of centres, hence two of each."""
+    """Couplings of like with like.
 
-    force: tuple[float, float]
-    force_up: float
-    torque: tuple[float, float]
-    spin: tuple[float, float, float, float]
-    stress_up: tuple[float, float, float]
-    stress_lean: tuple[float, float]
-    stress_mixed: tuple[float, float]
-    stress_flat: tuple[float, float]
+    Components of an order m >= 1 have two with each other: in the plane of the spheres' centres and ẑ, and across it.
+    """
+
+    force: tuple[float, float]  # F∥ to U∥
+    force_up: float  # F_z to U_z
+    torque: tuple[float, float]  # T∥ to Ω∥
+    spin: tuple[float, float, float, float]  # T_z with F∥; T∥ or S_∥z; T_z; D
+    stress_up: tuple[float, float, float]  # S_zz with S_zz, S_∥z, D
+    stress_lean: tuple[float, float]  # S_∥z with S_∥z
+    stress_mixed: tuple[float, float]  # S_∥z with D
+    stress_flat: tuple[float, float]  # D with D
 
 
 class Rising(NamedTuple):
     """Couplings from loads of lower to motions of higher degree; with the spheres exchanged, those the other way."""
 
-    force_up: float
-    torque: tuple[float, float]
-    torque_up: float
-    along: float
-    lean: tuple[float, float]
-    flat: tuple[float, float]
-    up: tuple[float, float, float]
-    turn: float
-    turn_lean: tuple[float, float]
-    turn_flat: tuple[float, float]
+    force_up: float  # F_z to U∥
+    torque: tuple[float, float]  # F∥ to Ω∥
+    torque_up: float  # F_z to Ω∥
+    along: float  # F∥ to E_zz
+    lean: tuple[float, float]  # F∥ to E_∥z
+    flat: tuple[float, float]  # F∥ to D
+    up: tuple[float, float, float]  # F_z to E_zz, E_∥z, D
+    turn: float  # T∥ to E_zz
+    turn_lean: tuple[float, float]  # T∥ to E_∥z
+    turn_flat: tuple[float, float]  # T∥ to D
 
 
 @compiled_within
@@ -123,16 +126,16 @@ def _parted(plus: float, minus: float) -> tuple[float, float]:
 
 
 @compiled_within
-def _both(n: int, h: Seven, Z: float, w: float, g: float, p: float) -> float:
-    """Give k^n (1 - η - η' + 2ηη') from its coefficients, at one order."""
-    return h[n] - Z * h[n + 1] + w * h[n + 2] - g * h[n + 3] + p * h[n + 4]
+def _both(n: int, waves: Seven, Z: float, w: float, g: float, p: float) -> float:
+    """Give k^n (1 - η - η' + 2ηη') at one order, from the coefficients of its powers of k."""
+    return waves[n] - Z * waves[n + 1] + w * waves[n + 2] - g * waves[n + 3] + p * waves[n + 4]
 
 
 @compiled_within
-def mutual(h: Harmonics, z: float, y: float, a2: float, b2: float) -> Mutual:
-    """Give the couplings of like with like of a target at height z and a source at height y, with squared radii."""
-    Z, w, s, g, p = z + y, 2 * z * y, a2 + b2, z * b2 + y * a2, a2 * b2
-    m0, m1, m2, m3, m4 = h
+def mutual(waves: Harmonics, z: float, h: float, a2: float, b2: float) -> Mutual:
+    """Give the couplings of like with like of a target at height z and a source at height h, with squared radii."""
+    m0, m1, m2, m3, m4 = waves
+    Z, w, s, g, p = z + h, 2 * z * h, a2 + b2, z * b2 + h * a2, a2 * b2
     s3, g3, p3 = s * (1 / 3), g * (2 / 3), p * (2 / 9)
     w5, g5, p5 = w + s * (1 / 5), g * (2 / 5), p * (2 / 25)
     K0, K1, K2 = _both(2, m0, Z, w5, g5, p5), _both(2, m1, Z, w5, g5, p5), _both(2, m2, Z, w5, g5, p5)
@@ -150,36 +153,34 @@ def mutual(h: Harmonics, z: float, y: float, a2: float, b2: float) -> Mutual:
 
 
 @compiled_within
-def _bent(n: int, h: Seven, z: float, a2: float) -> float:
-    """Give k^n (1 - 2kz + 2k²a²) at one order."""
-    return h[n] - 2 * (z * h[n + 1] - a2 * h[n + 2])
+def _bent(n: int, waves: Seven, z: float, a2: float) -> float:
+    """Give k^n (1 - 2kz + 2k²a2) at one order."""
+    return waves[n] - 2 * (z * waves[n + 1] - a2 * waves[n + 2])
 
 
 @compiled_within
-def rising(h: Harmonics, z: float, y: float, a2: float, b2: float) -> Rising:
-    """Give the couplings from lower to higher degree of a target at height z and a source at height y."""
-    m0, m1, m2, m3, _ = h
-    Z, D, w, a5, b3 = z + y, z - y, 2 * z * y, a2 * (1 / 5), b2 * (1 / 3)
-    wa, wb, g, p = w + b3 + a5, w + b3 - a5, 2 * (z * b3 + y * a5), 2 * a5 * b3
+def _leaning(n: int, waves: Seven, D: float, w: float, g: float, p: float) -> float:
+    """Give k^n (η - η' + 2ηη') at one order, from the coefficients of its powers of k."""
+    return D * waves[n + 1] + w * waves[n + 2] - g * waves[n + 3] + p * waves[n + 4]
+
+
+@compiled_within
+def rising(waves: Harmonics, z: float, h: float, a2: float, b2: float) -> Rising:
+    """Give the couplings from lower to higher degree of a target at height z and a source at height h."""
+    m0, m1, m2, m3, _ = waves
+    Z, D, w, a3, a5, b3 = z + h, z - h, 2 * z * h, a2 * (1 / 3), a2 * (1 / 5), b2 * (1 / 3)
+    wa, wb, g, p = w + b3 + a5, w + b3 - a5, 2 * (z * b3 + h * a5), 2 * a5 * b3
     A0, A1 = _both(1, m0, Z, wa, g, p), _both(1, m1, Z, wa, g, p)
     A2, A3 = _both(1, m2, Z, wa, g, p), _both(1, m3, Z, wa, g, p)
     C0, C1, C2, C3 = _bent(2, m0, z, a5), _bent(2, m1, z, a5), _bent(2, m2, z, a5), _bent(2, m3, z, a5)
-    # 2ηη' + η - η', both with c = 3
-    lift = (
-        D * m1[1] + (w + b3 - a2 * (1 / 3)) * m1[2] - 2 * (z * b3 + y * a2 * (1 / 3)) * m1[3] + 2 / 3 * a2 * b3 * m1[4]
-    )
     return Rising(
-        lift,
-        _parted(_bent(1, m0, y, b3) + m0[1], _bent(1, m2, y, b3) - m2[1]),
-        m1[1] + 2 * (y * m1[2] - b3 * m1[3]),
+        _leaning(0, m1, D, w + b3 - a3, 2 * (z * b3 + h * a3), 2 * a3 * b3),
+        _parted(_bent(1, m0, h, b3) + m0[1], _bent(1, m2, h, b3) - m2[1]),
+        m1[1] + 2 * (h * m1[2] - b3 * m1[3]),
         A1,
         _parted(A0 + m0[1], A2 - m2[1]),
         _parted(A1 + 2 * m1[1], A3 - 2 * m3[1]),
-        (
-            0.5 * (D * m0[2] + wb * m0[3] - g * m0[4] + p * m0[5]),
-            D * m1[2] + wb * m1[3] - g * m1[4] + p * m1[5],
-            D * m2[2] + wb * m2[3] - g * m2[4] + p * m2[5],
-        ),
+        (0.5 * _leaning(1, m0, D, wb, g, p), _leaning(1, m1, D, wb, g, p), _leaning(1, m2, D, wb, g, p)),
         C1,
         _parted(C0 + 0.5 * m0[2], C2 - 0.5 * m2[2]),
         _parted(C1 + m1[2], C3 - m3[2]),
@@ -190,8 +191,8 @@ def rising(h: Harmonics, z: float, y: float, a2: float, b2: float) -> Rising:
 def couple(like: Mutual, to: Rising, back: Rising, load: Eleven) -> Eleven:
     """Give the motion of the target of a load on the source, both in cylindrical components about the source's image.
 
-    Loads F_ρ F_φ 2F_z T_ρ T_φ T_z 3S_zz 2S_ρz 2S_φz D_ρρ D_ρφ; motions U_ρ U_φ U_z/2 Ω_ρ Ω_φ Ω_z E_zz/2 E_ρz E_φz
-    E_ρρ-E_φφ 2E_ρφ. `back` is `to` with the spheres exchanged.
+    Loads are F_ρ F_φ 2F_z T_ρ T_φ T_z 3S_zz 2S_ρz 2S_φz D_ρρ D_ρφ, motions U_ρ U_φ U_z/2 Ω_ρ Ω_φ Ω_z E_zz/2 E_ρz E_φz
+    E_ρρ-E_φφ 2E_ρφ, whose factors spare others. `back` is `to` with the spheres exchanged.
     """
     f, F, z, t, T, y, s, g, G, d, D = load
     return (
@@ -231,7 +232,7 @@ def couple(like: Mutual, to: Rising, back: Rising, load: Eleven) -> Eleven:
 
 @compiled_within
 def turned(c: float, s: float, load: Eleven) -> Eleven:
-    """Give loads or motions in axes turned about z by the angle of cosine c and sine s."""
+    """Give loads or motions in axes turned about z by the angle of cosine c and sine s; D turns by twice the angle."""
     x, y, z, p, q, r, o, g, e, d, f = load
     c2, s2 = c * c - s * s, 2 * c * s
     return (

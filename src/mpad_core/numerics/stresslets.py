@@ -20,8 +20,8 @@ sphere, is -S. Unbounded, with r from source to target, in units of 1/(8πη) an
 
 and their transposes; dev is the symmetric traceless part. Forces and torques: `stokeslets`. See Durlofsky, Brady and
 Bossis, J. Fluid Mech. 180 (1987) 21, and, at a wall, Swan and Brady, Phys. Fluids 19 (2007) 113306, for the method.
-What the wall adds stands in `stresslet_images`. Spheres that overlap are given the same formulas, which are not their
-surface averages then; where centres are the same, zero.
+What the wall adds stands in `stresslet_images`. Spheres that overlap are given the same formulas, which grow as r⁻⁵ and
+are not their surface averages then; where centres are the same, zero.
 
 Rows of each sphere: Ux Uy Uz Ωx Ωy Ωz E0..E4; columns Fx Fy Fz Tx Ty Tz S0..S4. Strains and stresslets are components
 on the orthonormal tensors (so that S:E = Σ S_k E_k)
@@ -39,7 +39,7 @@ from mpad_core.numerics.compiled import compiled, compiled_parallel, compiled_su
 from mpad_core.numerics.stresslet_images import Eleven, couple, harmonics, mutual, rising, turned
 
 TILE = 32  # spheres side by side in the product: a few vector registers of each quantity
-SHARES = 32  # of the product, and most threads that it can use; each takes memory for all motions
+SHARES = 32  # of the product, the most threads that it can use; each takes memory for all motions, 88 bytes a sphere
 SIZE = 11
 
 # inside, loads are F_x F_y 2F_z T 3S_zz 2S_xz 2S_yz (S_xx - S_yy)/2 S_xy and motions U_x U_y U_z/2 Ω E_zz/2 E_xz E_yz
@@ -89,21 +89,17 @@ def _free(r: tuple[float, float, float], q2: float, a2: float, b2: float, load: 
 
 
 @compiled_within
-def _unit(k: int) -> Eleven:
-    """Give the load of one and of no other component."""
-    return (
-        UNITS[0] * (k == 0),
-        UNITS[1] * (k == 1),
-        UNITS[2] * (k == 2),
-        UNITS[3] * (k == 3),
-        UNITS[4] * (k == 4),
-        UNITS[5] * (k == 5),
-        UNITS[6] * (k == 6),
-        UNITS[7] * (k == 7),
-        UNITS[8] * (k == 8),
-        UNITS[9] * (k == 9),
-        UNITS[10] * (k == 10),
-    )
+def _taken(load: Array) -> Eleven:
+    """Give an array (11,) as a tuple, which kernels keep in registers."""
+    return load[0], load[1], load[2], load[3], load[4], load[5], load[6], load[7], load[8], load[9], load[10]
+
+
+@compiled
+def _unit(k: int) -> Array:
+    """Give the load of one and of no other component, as it is inside."""
+    load = np.zeros(SIZE)
+    load[k] = UNITS[k]
+    return load
 
 
 @compiled_within
@@ -134,7 +130,7 @@ def add_free_fts(r: Array, a: float, b: float, scale: float, out: Array) -> None
     if square == 0:
         return
     for k in range(SIZE):
-        motion = _free((r[0], r[1], r[2]), 1 / square, a * a, b * b, _unit(k))
+        motion = _free((r[0], r[1], r[2]), 1 / square, a * a, b * b, _taken(_unit(k)))
         for i in range(SIZE):
             out[i, k] += scale * UNITS[i] * motion[i]
 
@@ -159,7 +155,7 @@ def add_image_fts(x: Array, y: Array, a: float, b: float, scale: float, out: Arr
     waves = harmonics(rho, z + h, -0.5)
     like, to, back = mutual(waves, z, h, a2, b2), rising(waves, z, h, a2, b2), rising(waves, h, z, b2, a2)
     for k in range(SIZE):
-        motion = turned(c, -s, couple(like, to, back, turned(c, s, _unit(k))))
+        motion = turned(c, -s, couple(like, to, back, turned(c, s, _taken(_unit(k)))))
         for i in range(SIZE):
             out[i, k] += scale * UNITS[i] * motion[i]
 
@@ -190,6 +186,7 @@ LOADS, MOTIONS, RETURNS, WORK = 4 * TILE, 15 * TILE, 26 * TILE, 37 * TILE
 
 @compiled_within
 def _load_at(work: Array, t: int) -> Eleven:
+    """Give the load of a tile's sphere."""
     return (
         work[LOADS + t],
         work[LOADS + TILE + t],
@@ -207,28 +204,15 @@ def _load_at(work: Array, t: int) -> Eleven:
 
 @compiled_within
 def _add_at(work: Array, start: int, motion: Eleven) -> None:
-    work[start] += motion[0]
-    work[start + TILE] += motion[1]
-    work[start + 2 * TILE] += motion[2]
-    work[start + 3 * TILE] += motion[3]
-    work[start + 4 * TILE] += motion[4]
-    work[start + 5 * TILE] += motion[5]
-    work[start + 6 * TILE] += motion[6]
-    work[start + 7 * TILE] += motion[7]
-    work[start + 8 * TILE] += motion[8]
-    work[start + 9 * TILE] += motion[9]
-    work[start + 10 * TILE] += motion[10]
-
-
-@compiled_within
-def _as_load(load: Array) -> Eleven:
-    return load[0], load[1], load[2], load[3], load[4], load[5], load[6], load[7], load[8], load[9], load[10]
+    """Add a motion to a tile's."""
+    for k in range(SIZE):
+        work[start + k * TILE] += motion[k]
 
 
 @compiled_sums
 def _free_onto_tile(work: Array, source: Array, load: Array, first: int) -> None:
     """Add the unbounded motions of a tile's spheres, from the first on, by a source, and those that they give it."""
-    x, y, z, b2, sent = source[0], source[1], source[2], source[3] * source[3], _as_load(load)
+    x, y, z, b2, sent = source[0], source[1], source[2], source[3] * source[3], _taken(load)
     for t in range(TILE):
         X, Y, Z, a2 = work[t] - x, work[TILE + t] - y, work[2 * TILE + t] - z, work[3 * TILE + t] ** 2
         square = X * X + Y * Y + Z * Z
@@ -241,7 +225,7 @@ def _free_onto_tile(work: Array, source: Array, load: Array, first: int) -> None
 @compiled_sums
 def _image_onto_tile(work: Array, source: Array, load: Array, first: int) -> None:
     """Add what the wall adds to these motions."""
-    x, y, h, b2, sent = source[0], source[1], source[2], source[3] * source[3], _as_load(load)
+    x, y, h, b2, sent = source[0], source[1], source[2], source[3] * source[3], _taken(load)
     for t in range(TILE):
         z, a2 = work[2 * TILE + t], work[3 * TILE + t] ** 2
         rho, c, s = _direction(work[t] - x, work[TILE + t] - y)
@@ -296,12 +280,9 @@ def _prepared(centres: Array, radii: Array, loads: Array) -> tuple[Array, Array,
     spheres = np.ones((tiles * TILE, 4))  # what fills up the last tile has no load
     inside = np.zeros((tiles * TILE, SIZE))
     for i in range(count):
-        spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3] = (
-            centres[i, 0],
-            centres[i, 1],
-            centres[i, 2],
-            radii[i],
-        )
+        for k in range(3):
+            spheres[i, k] = centres[i, k]
+        spheres[i, 3] = radii[i]
         for k in range(SIZE):
             inside[i, k] = loads[i, k] * UNITS[k]
     return spheres, inside, np.zeros((min(tiles, SHARES), tiles * TILE, SIZE))
@@ -346,8 +327,9 @@ def fts_product(centres: Array, radii: Array, viscosity: float, wall: bool, load
     count = len(radii)
     spheres, inside, parts = _prepared(centres, radii, loads)  # whole-array arithmetic here would wake the threads
     shares = len(parts)
-    if shares == 1:  # waking them costs more
-        _share(0, 1, spheres, inside, count, wall, parts[0])
+    if shares <= 2:  # waking them costs more
+        for share in range(shares):
+            _share(share, shares, spheres, inside, count, wall, parts[share])
     else:
         for share in numba.prange(shares):
             _share(share, shares, spheres, inside, count, wall, parts[share])
