@@ -327,7 +327,7 @@ def fts_product(centres: Array, radii: Array, viscosity: float, wall: bool, load
     count = len(radii)
     spheres, inside, parts = _prepared(centres, radii, loads)  # whole-array arithmetic here would wake the threads
     shares = len(parts)
-    if shares <= 2:  # waking them costs more
+    if shares <= 4:  # waking them costs more
         for share in range(shares):
             _share(share, shares, spheres, inside, count, wall, parts[share])
     else:

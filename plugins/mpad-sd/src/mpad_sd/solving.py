@@ -33,6 +33,7 @@ class Plan:
     tolerance: float
     strain: bool
     least_gap: float
+    reach: float
 
     def prepared(self, configuration: Configuration, guess: Array | None) -> "Prepared":
         """Check the configuration, find near pairs and form the blocks."""
@@ -46,7 +47,7 @@ class Plan:
             wall=self.setting.wall,
             least_gap=self.least_gap,
         )
-        degrees = degrees_of(scene.centres, radii, scene.gaps, scene.wall)
+        degrees = degrees_of(scene.centres, radii, scene.gaps, scene.wall, self.reach)
         far = far_of(scene.centres, radii, degrees.who, scene.wall)
         try:
             level = Level.of(scene, degrees, lubrication=True, far=far)

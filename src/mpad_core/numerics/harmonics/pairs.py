@@ -13,10 +13,11 @@ the degrees.
 import math
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.numerics.compiled import compiled, compiled_sums
+from mpad_core.numerics.compiled import compiled, compiled_parallel, compiled_sums
 from mpad_core.numerics.harmonics.image import RAISE, REACH, add_image_transposed, image_of
 from mpad_core.numerics.harmonics.layout import V, W, lowest, place, places
 from mpad_core.numerics.harmonics.translation import axial_blocks, axial_size, count
@@ -24,6 +25,10 @@ from mpad_core.numerics.harmonics.turning import add_turned_back, turn_about_z, 
 
 TARGET, SOURCE, TARGET_DEGREE, SOURCE_DEGREE, TURNS, AXIAL, WALL_TURNS, WALL_AXIAL = range(8)
 """Columns of `Pairs.rows`."""
+
+
+SERIAL, SHARES = 400, 8
+"""Pairs below which waking threads costs more than it gains, and the shares that more are dealt in."""
 
 
 class Pairs(NamedTuple):
@@ -216,23 +221,12 @@ def _add(y: Array, out: Array) -> None:
 
 
 @compiled_sums
-def pair_product(at: Places, pairs: Pairs, operators: Array, wall: bool, y: Array, out: Array) -> None:
-    """Write what every sphere gets from all others, directly and by their images.
-
-    Parameters
-    ----------
-    at, pairs
-        Spheres and blocks.
-    operators
-        Flat array of the `image_operator` of each sphere, as `at.operator` says; not read without a wall.
-    wall
-        Whether there is one.
-    y, out : (at.own[-1],)
-        Sources, and traces, written.
-    """
-    out[:] = 0.0
+def _some(
+    at: Places, pairs: Pairs, operators: Array, wall: bool, y: Array, first: int, last: int, out: Array
+) -> None:
+    """Add what the pairs from `first` to before `last` send each other."""
     z, work = workspace(at.degrees)
-    for k in range(len(pairs.rows)):
+    for k in range(first, last):
         row = pairs.rows[k]
         i, j, p, q = row[TARGET], row[SOURCE], row[TARGET_DEGREE], row[SOURCE_DEGREE]
         cosine, sine = pairs.azimuth[k]
@@ -255,3 +249,35 @@ def pair_product(at: Places, pairs: Pairs, operators: Array, wall: bool, y: Arra
             add_turned_back(q + RAISE, cosine, sine, z[1], z[3])
             add_image_transposed(q, operator, z[3], onto_source)
         add_turned_back(p, cosine, sine, z[0], out[at.own[i] : at.own[i + 1]].reshape(2, 3, ti))
+
+
+@compiled_parallel
+def pair_product(at: Places, pairs: Pairs, operators: Array, wall: bool, y: Array, out: Array) -> None:
+    """Write what every sphere gets from all others, directly and by their images.
+
+    Where pairs are many, they are dealt in shares to the threads, whose sums are kept apart: the bits do not depend on
+    the number of threads.
+
+    Parameters
+    ----------
+    at, pairs
+        Spheres and blocks.
+    operators
+        Flat array of the `image_operator` of each sphere, as `at.operator` says; not read without a wall.
+    wall
+        Whether there is one.
+    y, out : (at.own[-1],)
+        Sources, and traces, written.
+    """
+    count = len(pairs.rows)
+    for e in range(len(out)):
+        out[e] = 0.0
+    if count < SERIAL:
+        _some(at, pairs, operators, wall, y, 0, count, out)
+        return
+    parts = np.zeros((SHARES, len(out)))
+    for share in numba.prange(SHARES):
+        _some(at, pairs, operators, wall, y, share * count // SHARES, (share + 1) * count // SHARES, parts[share])
+    for share in range(SHARES):
+        for e in range(len(out)):
+            out[e] += parts[share, e]
