@@ -20,6 +20,7 @@ from mpad_core.numerics.wall_functions import (
     TROT,
     TSHEAR,
     TSPIN,
+    wall_drift,
     wall_functions,
     wall_functions_array,
     wall_mobility,
@@ -233,3 +234,18 @@ def test_lone_cell_in_shear():
     velocity = filled(wall_velocity, 6, *place, filled(wall_shear_load, 6, *place, 100.0))
     assert velocity[0] / (100 * 5.255e-6) == pytest.approx(0.665687934, abs=1e-9)
     assert velocity[4] > 0
+
+
+@pytest.mark.parametrize("eps", [1e-5, 5e-4, 1.7e-3, 0.03, 0.4, 0.999, 1.3, 20.0, 500.0])
+def test_drift_is_the_slope_of_the_mobility_by_the_series(eps):
+    a, eta, share = 1.4, 0.8, 0.01
+    steps = share * np.array([-2.0, -1.0, 1.0, 2.0])
+    mobility = [1 / float(wall_series(eps * (1 + s))[FPERP]) for s in steps]
+    slope = (mobility[0] - 8 * mobility[1] + 8 * mobility[2] - mobility[3]) / (12 * share * eps)
+    expected = slope / (6 * np.pi * eta * a * a)
+    assert wall_drift(a * eps, a, eta) == pytest.approx(expected, rel=3e-7 if eps < 100 else 1e-4)
+
+
+@pytest.mark.parametrize("eps", [0.0, -1e-9, np.nan])
+def test_no_drift_at_contact(eps):
+    assert np.isnan(wall_drift(eps, 1.0, 1.0))

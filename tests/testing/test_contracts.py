@@ -13,6 +13,7 @@ from mpad_core.interfaces.errors import PartError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting, SolverTraits
 from mpad_core.testing import (
     BondModelContract,
+    FluctuatingContract,
     GapForceContract,
     MobilitySolverContract,
     SurfaceContract,
@@ -169,6 +170,51 @@ def test_answering_what_is_no_number_is_found() -> None:
     solver_of("").test_refuses_what_is_no_number()
     with pytest.raises(pytest.fail.Exception, match="DID NOT RAISE"):
         solver_of("answers NaN").test_refuses_what_is_no_number()
+
+
+@frozen(kw_only=True)
+class Shaken(Skewed):
+    """The solver `rpb`, with its thermal motion spoilt."""
+
+    def root(self, prepared: Any, noise: Array) -> Array:
+        inner, ready, _ = prepared
+        root: Array = inner.root(ready, noise)
+        if self.fault == "too hot":
+            root *= 1.001
+        if self.fault == "one temper each":
+            root *= 1 + 1e-5 * np.linalg.norm(noise)
+        return root
+
+    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
+        inner, ready, _ = prepared
+        drift: Array = inner.drift(ready, noise)
+        if self.fault == "does not drift":
+            drift *= 0.0
+        if self.fault == "estimates twice" and noise is not None:
+            drift *= 2.0
+        return drift
+
+
+def shaken(fault: str) -> FluctuatingContract:
+    contract = FluctuatingContract()
+    contract.solver = Shaken(fault=fault)
+    return contract
+
+
+THERMAL_FAULTS: list[tuple[str, Callable[[FluctuatingContract], None]]] = [
+    ("too hot", lambda c: one(c.test_root_is_one_of_the_mobility, **AT)),
+    ("too hot", lambda c: c.test_root_of_many(True)),
+    ("one temper each", lambda c: c.test_root_is_linear(True)),
+    ("does not drift", lambda c: c.test_drift_is_the_divergence(True, THREE)),
+    ("estimates twice", lambda c: c.test_random_drift_is_right_in_the_mean(True, THREE.part(np.arange(2)))),
+]
+
+
+@pytest.mark.parametrize(("fault", "law"), THERMAL_FAULTS)
+def test_faulty_thermal_motion_is_found(fault: str, law: Callable[[FluctuatingContract], None]) -> None:
+    law(shaken(""))
+    with pytest.raises(AssertionError):
+        law(shaken(fault))
 
 
 @frozen(kw_only=True)

@@ -1,5 +1,8 @@
 """The errors that people see: one clear line, an exit code, never a traceback."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class MpadError(Exception):
     """What mpad tells its user in one line."""
@@ -23,6 +26,15 @@ class PartError(MpadError):
 
 class RefusedError(MpadError):
     """The numerics refuse to answer: names what could not be treated, and where."""
+
+
+@contextmanager
+def refused(solver: str, where: str = "") -> Iterator[None]:
+    """Turn what arithmetic could not do into a solver's refusal; `where` follows after a semicolon."""
+    try:
+        yield
+    except FloatingPointError as error:
+        raise RefusedError(f"{solver}: {error}" + (f"; {where}" if where else "")) from error
 
 
 class DiskFullError(MpadError):

@@ -60,14 +60,37 @@ class MobilitySolver(Protocol):
 
 @runtime_checkable
 class Fluctuating(Protocol):
-    """A solver that can also drive thermal motion."""
+    """A solver that can also drive thermal motion: its mobility M is that of `solve`, without the ambient flow."""
 
     def root(self, prepared: Any, noise: Array) -> Array:
-        """Apply a root B of the mobility, B·Bᵀ = M, to standard normal noise (N, 6)."""
+        """Apply a root B of the mobility, B·Bᵀ = M.
+
+        Parameters
+        ----------
+        noise : (N, 6) or (N, 6, k)
+            Independent standard normal numbers. B does not depend on them.
+
+        Returns
+        -------
+        (N, 6) or (N, 6, k)
+            B·noise: velocities of covariance M, (µm/s)² and so on for M in µm/(pN s) and so on.
+        """
         ...
 
-    def drift(self, prepared: Any) -> Array:
-        """Give the divergence of the mobility, ∇·M, as (N, 6)."""
+    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
+        """Give the divergence of the mobility, ∇·M, row i being Σ_j ∂M_ij/∂x_j over the 3N coordinates of the centres.
+
+        Parameters
+        ----------
+        noise : (N, 3), optional
+            Independent numbers of mean 0 and variance 1. With them the answer may be an estimate that is right in the
+            mean and costs a few solves however many the spheres; without, it is the divergence itself.
+
+        Returns
+        -------
+        (N, 6)
+            1/(pN s), and 1/(pN s µm) for the rotations; times kT a velocity.
+        """
         ...
 
 

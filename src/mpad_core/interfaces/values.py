@@ -68,6 +68,12 @@ class Configuration:
         """Give the configuration of some of the spheres, in the order asked for."""
         return Configuration(centres=self.centres[cells], radii=self.radii[cells], wall_gaps=self.wall_gaps[cells])
 
+    def moved(self, shift: Array) -> "Configuration":
+        """Give the configuration displaced by (N, 3), heights and gaps alike."""
+        return Configuration(
+            centres=self.centres + shift, radii=self.radii, wall_gaps=self.wall_gaps + np.asarray(shift)[:, 2]
+        )
+
 
 @frozen(kw_only=True)
 class Report:

@@ -39,6 +39,7 @@ __all__ = [
     "TROT",
     "TSHEAR",
     "TSPIN",
+    "wall_drift",
     "wall_functions",
     "wall_functions_array",
     "wall_mobility",
@@ -180,6 +181,46 @@ def wall_mobility(height: float, gap: float, radius: float, viscosity: float, ou
     out[1, 3] = out[3, 1] = cross / determinant
     out[2, 2] = 1.0 / out[2, 2]
     out[5, 5] = 1.0 / out[5, 5]
+
+
+@compiled
+def _perpendicular_slope(eps: float) -> float:
+    """Give the derivative of 1/fperp by eps; the ranges and forms are those of `wall_functions`."""
+    value, slope = 0.0, 0.0  # below eps = 1: of eps fperp, and eps times its derivative
+    if not eps > 0.0:
+        return nan
+    if eps >= 1.0:
+        x = 1.0 / (1.0 + eps)
+        t = 4.0 * x - 1.0
+        for power in range(FAR.shape[0] - 1, -1, -1):
+            slope = slope * t + value
+            value = value * t + FAR[power, FPERP]
+        f = 1.0 + x * value
+        return x * x * (value + 4.0 * x * slope) / (f * f)
+    if eps < NEAR_LIMIT:
+        logarithm = log(1.0 / eps)
+        for power in range(NEAR.shape[0] - 1, -1, -1):
+            term = NEAR[power, 0, FPERP] + NEAR[power, 1, FPERP] * logarithm
+            value = value * eps + term
+            slope = slope * eps + power * term - NEAR[power, 1, FPERP]
+    else:
+        mantissa, exponent = frexp(eps)
+        octave, t = OCTAVES - 1 + exponent, 4.0 * mantissa - 3.0
+        for power in range(MIDDLE.shape[1] - 1, -1, -1):
+            slope = slope * t + value
+            value = value * t + MIDDLE[octave, power, FPERP]
+        slope *= 4.0 * mantissa
+    return (value - slope) / (value * value)
+
+
+@compiled
+def wall_drift(gap: float, radius: float, viscosity: float) -> float:
+    """Give the derivative of the mobility M_zz of a sphere above the wall by its height, in m/(N s) a metre.
+
+    It is all that the divergence of a lone sphere's mobility is made of: M changes with the height alone, and a force
+    along z turns nothing and moves nothing sideways. Parameters as for `wall_mobility`.
+    """
+    return _perpendicular_slope(gap / radius) / (6.0 * np.pi * viscosity * radius * radius)
 
 
 @compiled

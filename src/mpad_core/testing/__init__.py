@@ -14,11 +14,12 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(f"{error}; install mpad-core[testing]", name=error.name) from error
 
-_ROOMS = ("bonds", "claims", "forces", "invariance", "mobility", "solving", "surfaces")
+_ROOMS = ("bonds", "claims", "fluctuating", "forces", "invariance", "mobility", "solving", "surfaces")
 pytest.register_assert_rewrite(*(f"{__name__}.{room}" for room in _ROOMS))  # before they are imported
 
 from mpad_core.testing.bonds import BondModelContract  # noqa: E402
 from mpad_core.testing.claims import Claim  # noqa: E402
+from mpad_core.testing.fluctuating import FluctuatingContract  # noqa: E402
 from mpad_core.testing.forces import GapForceContract  # noqa: E402
 from mpad_core.testing.mobility import MobilitySolverContract  # noqa: E402
 from mpad_core.testing.samples import typical  # noqa: E402
@@ -28,6 +29,7 @@ from mpad_core.testing.surfaces import SurfaceContract  # noqa: E402
 __all__ = [
     "BondModelContract",
     "Claim",
+    "FluctuatingContract",
     "GapForceContract",
     "MobilitySolverContract",
     "SurfaceContract",

@@ -111,6 +111,25 @@ class CdlBiem:
         motion: Motion = prepared.solve(loads)
         return motion
 
+    def root(self, prepared: Any, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with a root of the mobility: Cholesky's for few spheres, else Lanczos.
+
+        Raises
+        ------
+        RefusedError
+            If an iteration does not converge.
+        """
+        root: Array = prepared.root(noise)
+        return root
+
+    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
+        """Give the divergence of the mobility (N, 6): by central differences, or by a random one of noise (N, 3).
+
+        The degrees are those of the configuration itself, so that no difference runs across a change of degree.
+        """
+        drift: Array = prepared.drift(noise)
+        return drift
+
     def flow(self, prepared: Any, motion: Motion, points: Array) -> Array:
         """Give the fluid's velocity (n, 3) at points (n, 3) outside the spheres, for a motion under one load."""
         velocity: Array = prepared.flow(motion, points)

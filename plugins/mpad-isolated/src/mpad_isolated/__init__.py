@@ -49,6 +49,16 @@ class Isolated:
         motion: Motion = prepared.solve(loads)
         return motion
 
+    def root(self, prepared: Any, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with the Cholesky factors of the spheres' mobilities."""
+        root: Array = prepared.root(noise)
+        return root
+
+    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
+        """Give the divergence of the mobility (N, 6), exactly, whatever the noise."""
+        drift: Array = prepared.drift()
+        return drift
+
 
 @hookimpl
 def mpad_mobility_solvers() -> list[type[MobilitySolver]]:

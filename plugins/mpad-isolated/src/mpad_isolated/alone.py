@@ -10,7 +10,7 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.compiled import compiled
-from mpad_core.numerics.wall_functions import wall_mobility, wall_shear_load
+from mpad_core.numerics.wall_functions import wall_drift, wall_mobility, wall_shear_load
 from mpad_isolated.neglected import error_of
 
 
@@ -72,6 +72,20 @@ class Alone:
             raise RefusedError("isolated: the loads are not finite")
         error = error_of(self.configuration, self.setting, np.ascontiguousarray(columns), velocity)
         return Motion(velocity=velocity.reshape(np.shape(loads)), report=Report(error=error))
+
+    def root(self, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with each sphere's Cholesky factor."""
+        columns = np.asarray(noise, dtype=np.float64).reshape(len(self.free), 6, -1)
+        return np.asarray(np.linalg.cholesky(self.mobility) @ columns).reshape(np.shape(noise))
+
+    def drift(self) -> Array:
+        """Give ∇·M (N, 6): each sphere's own, and zero without a wall."""
+        drift = np.zeros((len(self.free), 6))
+        if self.setting.wall:
+            at = self.configuration
+            own = [wall_drift(h, a, self.setting.viscosity) for h, a in zip(at.wall_gaps, at.radii, strict=True)]
+            drift[:, 2] = own
+        return drift
 
 
 def refuse_bad(configuration: Configuration, wall: bool) -> None:

@@ -68,6 +68,24 @@ class RotnePragerBlake:
         motion: Motion = prepared.solve(loads)
         return motion
 
+    def root(self, prepared: Any, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with a root of the mobility: Cholesky's for few spheres, else Lanczos.
+
+        Raises
+        ------
+        RefusedError
+            If the mobility is not positive definite, or the iteration does not converge.
+        """
+        from mpad_rpb import fluctuating
+
+        return fluctuating.root(prepared, noise)
+
+    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
+        """Give the divergence of the mobility (N, 6): by central differences, or by a random one of noise (N, 3)."""
+        from mpad_rpb import fluctuating
+
+        return fluctuating.drift(prepared, noise)
+
 
 @hookimpl
 def mpad_mobility_solvers() -> list[type[MobilitySolver]]:

@@ -26,6 +26,7 @@ class Spheres:
     ambient: Array  # (N, 6), the ambient flow's velocity and rotation at the centres as given
     setting: Setting
     exact: bool
+    configuration: Configuration  # as given
 
     @classmethod
     def of(cls, configuration: Configuration, setting: Setting, exact: bool) -> "Spheres":
@@ -46,6 +47,7 @@ class Spheres:
             ambient=ambient,
             setting=setting,
             exact=exact,
+            configuration=configuration,
         )
 
     def closest(self) -> str:

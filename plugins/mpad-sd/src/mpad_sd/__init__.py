@@ -26,9 +26,9 @@ class StokesianDynamics:
     tolerance
         Residual at which the iteration stops; for a whole mobility matrix 1e-9 at most.
     reach
-        In smaller radii: the gap up to which a pair counts as near. What drives a passing cell from or to the wall is of
-        the order of the moments left out beyond; where cells are crowded, 1.5 takes less time and memory, and keeps the
-        speed along the flow to some per cent.
+        In smaller radii: the gap up to which a pair counts as near. The drift from and to the wall is of the order of
+        the moments left out beyond. Where cells are crowded, 1.5 takes less time and memory, and keeps the speed along
+        the flow right to some per cent.
     strain
         Whether spheres feel and make rates of strain beyond their own wall; without, the error in shear shows what the
         stresslets are worth.
@@ -73,6 +73,22 @@ class StokesianDynamics:
         """
         motion: Motion = prepared.solve(loads)
         return motion
+
+    def root(self, prepared: Any, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with a root of the mobility: Cholesky's for few spheres, else Lanczos.
+
+        Raises
+        ------
+        RefusedError
+            If an iteration does not converge.
+        """
+        root: Array = prepared.root(noise)
+        return root
+
+    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
+        """Give the divergence of the mobility (N, 6): by central differences, or by a random one of noise (N, 3)."""
+        drift: Array = prepared.drift(noise)
+        return drift
 
 
 @hookimpl

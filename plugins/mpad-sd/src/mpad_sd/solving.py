@@ -4,19 +4,18 @@ import numpy as np
 from attrs import evolve, frozen
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.errors import refused
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
+from mpad_core.numerics.harmonics.degrees import Degrees
 from mpad_core.numerics.harmonics.far import far_of
-from mpad_core.numerics.harmonics.krylov import solve_columns
+from mpad_core.numerics.harmonics.fluctuating import divergence_of, root_of
 from mpad_core.numerics.harmonics.levels import Flow, Level, Scene
+from mpad_core.numerics.harmonics.products import solved
 from mpad_core.numerics.harmonics.warm import kept, started
 from mpad_core.numerics.neighbours import closest_pair
 from mpad_sd.accuracy import error_of
 from mpad_sd.near import degrees_of
 from mpad_sd.refusing import refuse_bad, refuse_loads
-
-MOST = 600
-"""Iterations after which a solve is given up."""
 
 MATRIX = 1e-9
 """Residual for the columns of a mobility matrix, whose weakest motions feel it."""
@@ -38,30 +37,32 @@ class Plan:
     def prepared(self, configuration: Configuration, guess: Array | None) -> "Prepared":
         """Check the configuration, find near pairs and form the blocks."""
         refuse_bad(configuration, self.setting)
-        radii, gaps = configuration.radii, configuration.wall_gaps
-        scene = Scene(
-            centres=self._above_the_wall(configuration),
+        scene = self._scene(configuration)
+        degrees = degrees_of(scene.centres, scene.radii, scene.gaps, scene.wall, self.reach)
+        with refused("sd", closest(configuration)):
+            level = level_of(scene, degrees)
+        return Prepared(plan=self, degrees=degrees, level=level, guess=guess)
+
+    def _scene(self, configuration: Configuration) -> Scene:
+        """Put what touches to the least gap from the wall; pairs are put so for lubrication alone."""
+        centres, radii, gaps = configuration.centres, configuration.radii, configuration.wall_gaps
+        if self.setting.wall and (gaps < self.least_gap * radii).any():
+            centres, gaps = centres.copy(), np.maximum(gaps, self.least_gap * radii)
+            centres[:, 2] = np.maximum(centres[:, 2], radii)
+        return Scene(
+            centres=centres,
             radii=radii,
-            gaps=np.maximum(gaps, self.least_gap * radii) if self.setting.wall else gaps,
+            gaps=gaps,
             flow=Flow(self.setting.shear_rate, self.setting.shear_rate if self.strain else 0.0),
             wall=self.setting.wall,
             least_gap=self.least_gap,
         )
-        degrees = degrees_of(scene.centres, radii, scene.gaps, scene.wall, self.reach)
-        far = far_of(scene.centres, radii, degrees.who, scene.wall)
-        try:
-            level = Level.of(scene, degrees, lubrication=True, far=far)
-        except FloatingPointError as error:
-            raise RefusedError(f"sd: {error}; {closest(configuration)}") from error
-        return Prepared(plan=self, level=level, guess=guess)
 
-    def _above_the_wall(self, configuration: Configuration) -> Array:
-        """Put centres that rounding has brought nearer to the wall than the radius where they touch it."""
-        if not self.setting.wall or (configuration.centres[:, 2] >= configuration.radii).all():
-            return configuration.centres
-        centres = configuration.centres.copy()
-        centres[:, 2] = np.maximum(centres[:, 2], configuration.radii)
-        return centres
+
+def level_of(scene: Scene, degrees: Degrees) -> Level:
+    """Form the blocks of near pairs and spheres, and make far pairs ready."""
+    far = far_of(scene.centres, scene.radii, degrees.who, scene.wall)
+    return Level.of(scene, degrees, lubrication=True, far=far)
 
 
 def closest(configuration: Configuration) -> str:
@@ -74,7 +75,7 @@ def closest(configuration: Configuration) -> str:
 
 @frozen(kw_only=True, eq=False)
 class Solved:
-    """Velocities (K, N, 6) in the units of `layout`, how it went, and the sources (K, n) if they were few."""
+    """Velocities (K, N, 6), how it went, and the sources (K, n) if they were few."""
 
     velocity: Array
     report: Report
@@ -86,6 +87,7 @@ class Prepared:
     """The equations of a configuration."""
 
     plan: Plan
+    degrees: Degrees
     level: Level
     guess: Array | None = None
 
@@ -95,28 +97,39 @@ class Prepared:
         units = self.level.units
         columns = np.moveaxis(loads.reshape(len(units), 6, -1), 2, 0) / (self.plan.setting.viscosity * units)
         if len(columns) >= units.size:
-            solved = self._by_matrix(columns)
+            found = self._by_matrix(columns)
         else:
-            solved = self._solved(self.level.ambient, columns + self.level.load, self.plan.tolerance)
-        velocity = np.moveaxis(solved.velocity / units, 0, 2).reshape(loads.shape)
-        guess = None if solved.sources is None else kept(self.level.system.at, solved.sources)
-        return Motion(velocity=velocity, report=solved.report, guess=guess)
+            found = self._solved(self.level.ambient, columns + self.level.load, self.plan.tolerance)
+        velocity = np.moveaxis(found.velocity, 0, 2).reshape(loads.shape)
+        guess = None if found.sources is None else kept(self.level.system.at, found.sources)
+        return Motion(velocity=velocity, report=found.report, guess=guess)
 
     def _by_matrix(self, columns: Array) -> Solved:
         """Multiply with the mobility, made symmetric, and add the free motion: errors are those of unit loads."""
-        unit, mobility, tolerance = self._matrix()
+        tolerance, units = min(self.plan.tolerance, MATRIX), self.level.units
+        unit = np.eye(units.size).reshape(units.size, *units.shape)
+        found = self._solved(np.zeros_like(self.level.ambient), unit, tolerance)
+        mobility = (found.velocity * units).reshape(units.size, units.size)
         free = self._solved(self.level.ambient, self.level.load[None], tolerance)
-        velocity = columns.reshape(len(columns), -1) @ mobility + free.velocity.ravel()
-        report = evolve(unit, error=max(unit.error, free.report.error))
-        return Solved(velocity=velocity.reshape(columns.shape), report=report, sources=None)
+        moved = columns.reshape(len(columns), -1) @ (0.5 * (mobility + mobility.T))
+        report = evolve(found.report, error=max(found.report.error, free.report.error))
+        return Solved(velocity=moved.reshape(columns.shape) / units + free.velocity, report=report, sources=None)
 
-    def _matrix(self) -> tuple[Report, Array, float]:
-        """Give the mobility (6N, 6N) in the units of `layout`, and how it was found."""
-        tolerance, size = min(self.plan.tolerance, MATRIX), self.level.units.size
-        unit = np.eye(size).reshape(size, *self.level.units.shape)
-        solved = self._solved(np.zeros_like(self.level.ambient), unit, tolerance)
-        columns = solved.velocity.reshape(size, size)
-        return solved.report, 0.5 * (columns + columns.T), tolerance
+    def root(self, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with a root of the mobility."""
+        with refused("sd"):
+            return root_of(self.level, self.plan.setting.viscosity, noise)
+
+    def drift(self, noise: Array | None) -> Array:
+        """Give ∇·M (N, 6), near pairs and degrees staying what they are, by all differences or by a random one."""
+        scene = evolve(self.level.scene, flow=Flow(0.0, 0.0))
+
+        def level_at(shift: Array) -> Level:
+            moved = evolve(scene, centres=scene.centres + shift, gaps=scene.gaps + shift[:, 2])
+            return level_of(moved, self.degrees)
+
+        with refused("sd"):
+            return divergence_of(self.level, level_at, self.plan.setting.viscosity, noise)
 
     def _solved(self, ambient: Array, loads: Array, tolerance: float) -> Solved:
         """Solve for loads (K, N, 6), corrections included, a few at a time: sources take more room than velocities.
@@ -126,21 +139,20 @@ class Prepared:
         RefusedError
             If the iteration does not converge.
         """
-        system, u = self.level.system, np.empty(loads.shape)
+        system, velocity = self.level.system, np.empty(loads.shape)
         lonely = np.ones(len(system.at.degrees), np.int64)
-        lonely[system.pairs.rows[:, :2]] = 0
+        lonely[self.degrees.who] = 0
         start = started(self.guess, len(loads), system.at)
         error, iterations, residual = 0.0, 0, 0.0
         for first in range(0, len(loads), TOGETHER):
             some = slice(first, first + TOGETHER)
             given = np.ascontiguousarray(loads[some])
             y = np.zeros((len(given), system.at.own[-1])) if start is None else start[some].copy()
-            done, left = solve_columns(system, ambient, given, tolerance, MOST, y, u[some])
+            with refused("sd"):
+                u, done, left = solved(self.level, ambient, given, tolerance, y)
+            velocity[some] = u
             iterations, residual = max(iterations, done), max(residual, left)
-            if not left <= tolerance:
-                raise RefusedError(f"sd: no convergence: residual {left:.2g} after {done} iterations")
-            error = max(
-                error, *(error_of(system, ambient, *each, lonely) for each in zip(given, y, u[some], strict=True))
-            )
+            each = zip(given, y, u * self.level.units, strict=True)
+            error = max(error, *(error_of(system, ambient, *column, lonely) for column in each))
         report = Report(error=error + residual, iterations=iterations, residual=residual)
-        return Solved(velocity=u, report=report, sources=y if len(loads) <= TOGETHER else None)
+        return Solved(velocity=velocity, report=report, sources=y if len(loads) <= TOGETHER else None)

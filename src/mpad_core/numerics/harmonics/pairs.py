@@ -221,9 +221,7 @@ def _add(y: Array, out: Array) -> None:
 
 
 @compiled_sums
-def _some(
-    at: Places, pairs: Pairs, operators: Array, wall: bool, y: Array, first: int, last: int, out: Array
-) -> None:
+def _some(at: Places, pairs: Pairs, operators: Array, wall: bool, y: Array, first: int, last: int, out: Array) -> None:
     """Add what the pairs from `first` to before `last` send each other."""
     z, work = workspace(at.degrees)
     for k in range(first, last):

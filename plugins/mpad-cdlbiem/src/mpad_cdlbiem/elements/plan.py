@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from attrs import field, frozen, validators
+from attrs import evolve, field, frozen, validators
 
 from mpad_cdlbiem.elements.flow import Moving
 from mpad_cdlbiem.elements.friction import Friction
@@ -14,6 +14,7 @@ from mpad_cdlbiem.elements.solution import Iterating, Solution, solution
 from mpad_cdlbiem.refusing import refuse_bad, refuse_loads
 from mpad_core.arrays import Array
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
+from mpad_core.numerics.fluctuations import dense_root, divergence, room_to_move
 
 INNER = 4  # Gauss points each way on an element seen from other surfaces
 SHARE = 0.5  # of the difference from half as fine a mesh that is left as error
@@ -71,16 +72,26 @@ class ElementsPlan:
         refuse_many(len(configuration.radii), self.elements)
         side = math.isqrt(self.elements // 6)
         iterating = Iterating(name=self.iteration, tolerance=self.tolerance, guess=guess)
-        fine = solution(mesh_of(side, INNER), configuration, self.setting, iterating)
+        fine = self._fine(configuration, iterating)
         other = self._coarse(side, configuration).lubricated if self.lubrication else fine.lubricated
         return Prepared(
-            setting=self.setting,
+            plan=self,
             configuration=configuration,
             solution=fine,
-            friction=fine.lubricated if self.lubrication else fine.raw,
+            friction=self._chosen(fine),
             other=other,
             share=SHARE if self.lubrication else 1.0,
         )
+
+    def _fine(self, configuration: Configuration, iterating: Iterating) -> Solution:
+        return solution(mesh_of(math.isqrt(self.elements // 6), INNER), configuration, self.setting, iterating)
+
+    def _chosen(self, fine: Solution) -> Friction:
+        return fine.lubricated if self.lubrication else fine.raw
+
+    def friction(self, configuration: Configuration) -> Friction:
+        """Give the resistance alone, without the means to tell its error."""
+        return self._chosen(self._fine(configuration, Iterating(name=self.iteration, tolerance=self.tolerance)))
 
     def _coarse(self, side: int, configuration: Configuration) -> Solution:
         mesh = mesh_of((side + 1) // 2, INNER)
@@ -91,7 +102,7 @@ class ElementsPlan:
 class Prepared:
     """The spheres' resistance and load, by elements and lubrication, and others by which to tell the error."""
 
-    setting: Setting
+    plan: ElementsPlan
     configuration: Configuration
     solution: Solution
     friction: Friction
@@ -125,8 +136,24 @@ class Prepared:
         """
         forces, density = self.solution.moving(motion.velocity.ravel())
         return Moving(
-            at=self.configuration, setting=self.setting, velocity=motion.velocity, forces=forces, density=density
+            at=self.configuration, setting=self.plan.setting, velocity=motion.velocity, forces=forces, density=density
         ).flow(points)
+
+    def root(self, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with the Cholesky factor of the mobility."""
+        mobility = np.linalg.inv(self.friction.resistance)
+        return dense_root((mobility + mobility.T) / 2, noise)
+
+    def drift(self, noise: Array | None) -> Array:
+        """Give ∇·M (N, 6), by differences over all coordinates or by one random difference."""
+        still = evolve(self.plan, setting=evolve(self.plan.setting, shear_rate=0.0))
+        at = self.configuration
+
+        def product_at(shift: Array, loads: Array) -> Array:
+            return still.friction(at.moved(shift)).velocity(loads.reshape(-1, 1)).reshape(-1, 6)
+
+        gaps = at.wall_gaps if still.setting.wall else None
+        return divergence(product_at, room_to_move(at.centres, at.radii, gaps), noise)
 
     def spectral_radius(self) -> float:
         """Give the largest |eigenvalue| of the deflated operator, which is how fast Picard's iteration converges."""

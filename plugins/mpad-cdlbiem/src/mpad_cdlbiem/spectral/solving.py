@@ -1,11 +1,11 @@
 """From a configuration to velocities: two levels of degrees, whose difference is the estimate of the error."""
 
 import numpy as np
-from attrs import frozen
+from attrs import evolve, frozen
 
 from mpad_cdlbiem.refusing import refuse_bad, refuse_loads
 from mpad_core.arrays import Array
-from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.errors import refused
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.harmonics.degrees import (
     Degrees,
@@ -16,12 +16,10 @@ from mpad_core.numerics.harmonics.degrees import (
     most_degrees,
     spread_of,
 )
-from mpad_core.numerics.harmonics.krylov import solve_columns
+from mpad_core.numerics.harmonics.fluctuating import divergence_of, root_of
 from mpad_core.numerics.harmonics.levels import Flow, Level, Scene
+from mpad_core.numerics.harmonics.products import solved
 from mpad_core.numerics.harmonics.warm import between, kept, started
-
-MOST = 600
-"""Iterations after which a solve is given up."""
 
 BLOCK = 1e-8
 """Residual for several right-hand sides: together they may be a mobility matrix, to be symmetric to 1e-7."""
@@ -46,21 +44,35 @@ class SpectralPlan:
     def prepared(self, configuration: Configuration, guess: Array | None) -> "Prepared":
         """Check the configuration, choose degrees and form the blocks."""
         refuse_bad(configuration, self.setting)
-        scene = Scene(
+        scene = self._scene(configuration)
+        fine = self._degrees(scene)
+        coarse = coarser(fine)
+        return Prepared(
+            plan=self,
+            coarse=self._level(scene, coarse),
+            fine=self._level(scene, fine),
+            degrees=fine,
+            share=extrapolated(fine, coarse),
+            guess=guess,
+        )
+
+    def level(self, configuration: Configuration, degrees: Degrees) -> Level:
+        """Form the blocks at given degrees, without the means to tell their error."""
+        refuse_bad(configuration, self.setting)
+        return self._level(self._scene(configuration), degrees)
+
+    def _scene(self, configuration: Configuration) -> Scene:
+        return Scene(
             centres=configuration.centres,
             radii=configuration.radii,
             gaps=configuration.wall_gaps,
             flow=Flow(self.setting.shear_rate, self.setting.shear_rate),
             wall=self.setting.wall,
         )
-        fine = self._degrees(scene)
-        coarse = coarser(fine)
-        try:
-            levels = [Level.of(scene, degrees, self.lubrication) for degrees in (coarse, fine)]
-        except FloatingPointError as error:
-            raise RefusedError(f"cdl-biem: {error}") from error
-        share = extrapolated(fine, coarse)
-        return Prepared(plan=self, coarse=levels[0], fine=levels[1], share=share, guess=guess)
+
+    def _level(self, scene: Scene, degrees: Degrees) -> Level:
+        with refused("cdl-biem"):
+            return Level.of(scene, degrees, self.lubrication)
 
     def _degrees(self, scene: Scene) -> Degrees:
         most = most_degrees(most_degree(self.accuracy), scene.radii)
@@ -76,6 +88,7 @@ class Prepared:
     plan: SpectralPlan
     coarse: Level
     fine: Level
+    degrees: Degrees  # of the fine level
     share: float  # of the difference between the levels that is the fine one's error
     guess: Array | None = None
 
@@ -97,14 +110,26 @@ class Prepared:
         motion = np.moveaxis(velocity, 0, 2).reshape(loads.shape)
         return Motion(velocity=motion, report=report, guess=kept(self.fine.system.at, y))
 
+    def root(self, noise: Array) -> Array:
+        """Multiply noise (N, 6) or (N, 6, k) with a root of the mobility."""
+        with refused("cdl-biem"):
+            return root_of(self.fine, self.plan.setting.viscosity, noise)
+
+    def drift(self, noise: Array | None) -> Array:
+        """Give ∇·M (N, 6) of the fine level at its degrees, by all differences or by one random difference."""
+        still = evolve(self.plan, setting=evolve(self.plan.setting, shear_rate=0.0))
+        scene = self.fine.scene
+        at = Configuration(centres=scene.centres, radii=scene.radii, wall_gaps=scene.gaps)
+        with refused("cdl-biem"):
+            return divergence_of(
+                self.fine, lambda shift: still.level(at.moved(shift), self.degrees), still.setting.viscosity, noise
+            )
+
     def _solved(self, level: Level, columns: Array, y: Array, tolerance: float) -> tuple[Array, int, float]:
         """Solve at one level; `y` is the first guess and becomes the answer. Velocities (K, N, 6)."""
-        u = np.empty(columns.shape)
         loads = np.ascontiguousarray(columns / level.units + level.load)
-        iterations, residual = solve_columns(level.system, level.ambient, loads, tolerance, MOST, y, u)
-        if not residual <= tolerance:
-            raise RefusedError(f"cdl-biem: no convergence: residual {residual:.2g} after {iterations} iterations")
-        return u / level.units, iterations, residual
+        with refused("cdl-biem"):
+            return solved(level, level.ambient, loads, tolerance, y)
 
     def _error(self, velocity: Array, lower: Array) -> float:
         """Estimate the relative error of (U, aΩ) by what the last degrees changed; the worst of all columns."""
