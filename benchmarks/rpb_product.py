@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from mpad_core.interfaces.values import Configuration, Setting
-from mpad_core.numerics.stokeslets import mobility_product
+from mpad_core.numerics.stokeslet_products import mobility_product
 from mpad_rpb import RotnePragerBlake
 
 FLUID = Setting(viscosity=1e-3, shear_rate=80.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpad_core.arrays import Array
-from mpad_core.numerics import stokeslets
+from mpad_core.numerics import stokeslet_products, stokeslets
 
 PEERS = Path(__file__).parents[2].parent / "shared" / "peer_refs"
 SCALE = 1 / (8 * np.pi)
@@ -231,5 +231,5 @@ def test_product_is_the_matrix_times_the_loads(count: int, wall: bool) -> None:
     centres, radii = random_spheres(rng, count, 8.0)
     loads = rng.normal(size=(count, 6))
     expected = stokeslets.grand_mobility(centres, radii, 0.7, wall) @ loads.reshape(-1)
-    found = stokeslets.mobility_product(centres, radii, 0.7, wall, loads)
+    found = stokeslet_products.mobility_product(centres, radii, 0.7, wall, loads)
     assert np.linalg.norm(found.reshape(-1) - expected) < 1e-13 * np.linalg.norm(expected)

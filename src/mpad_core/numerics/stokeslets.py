@@ -33,13 +33,10 @@ Rows of each sphere: Ux Uy Uz Ωx Ωy Ωz; columns Fx Fy Fz Tx Ty Tz. Any consis
 
 import math
 
-import numba
 import numpy as np
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled, compiled_parallel
-
-TILE = 64  # targets side by side in the product: a few vector registers of each quantity, and all of them in the cache
+from mpad_core.numerics.compiled import compiled
 
 
 @compiled
@@ -233,112 +230,3 @@ def grand_mobility(centres: Array, radii: Array, viscosity: float, wall: bool) -
                     grand[6 * i + k, 6 * j + m] = block[k, m]
                     grand[6 * j + m, 6 * i + k] = block[k, m]
     return grand
-
-
-@compiled
-def _free_onto_tile(at: Array, source: Array, load: Array, out: Array) -> bool:
-    """Add a source's unbounded far field to a tile; spheres that overlap it are left out, and whether any is, told."""
-    x, y, z, b2 = source[0], source[1], source[2], source[3] * source[3]
-    fx, fy, fz, tx, ty, tz = load[0], load[1], load[2], load[3], load[4], load[5]
-    near = 0
-    for t in range(TILE):
-        X, Y, Z, reach = at[t] - x, at[TILE + t] - y, at[2 * TILE + t] - z, at[3 * TILE + t] + source[3]
-        square = X * X + Y * Y + Z * Z
-        far = square >= reach * reach
-        near |= not far
-        q2 = (1.0 if far else 0.0) / (square if far else 1.0)
-        q = math.sqrt(q2)
-        q3, s = q * q2, at[3 * TILE + t] * at[3 * TILE + t] + b2
-        along = q3 * (1 - s * q2) * (X * fx + Y * fy + Z * fz)
-        across = q + s * q2 * q * (1 / 3)
-        twist = 1.5 * q3 * q2 * (X * tx + Y * ty + Z * tz)
-        out[t] += across * fx + along * X + q3 * (ty * Z - tz * Y)
-        out[TILE + t] += across * fy + along * Y + q3 * (tz * X - tx * Z)
-        out[2 * TILE + t] += across * fz + along * Z + q3 * (tx * Y - ty * X)
-        out[3 * TILE + t] += twist * X + q3 * (fy * Z - fz * Y - 0.5 * tx)
-        out[4 * TILE + t] += twist * Y + q3 * (fz * X - fx * Z - 0.5 * ty)
-        out[5 * TILE + t] += twist * Z + q3 * (fx * Y - fy * X - 0.5 * tz)
-    return near != 0
-
-
-@compiled
-def _image_onto_tile(at: Array, source: Array, load: Array, out: Array) -> None:
-    """Add what the wall adds to a source's field to a tile; the module's text gives the terms."""
-    x, y, h, b2 = source[0], source[1], source[2], source[3] * source[3]
-    fx, fy, fz, tx, ty, tz = load[0], load[1], load[2], load[3], load[4], load[5]
-    for t in range(TILE):
-        X, Y, z, a2 = at[t] - x, at[TILE + t] - y, at[2 * TILE + t], at[3 * TILE + t] * at[3 * TILE + t]
-        Z = z + h
-        q2 = 1 / (X * X + Y * Y + Z * Z)
-        q = math.sqrt(q2)
-        q3 = q * q2
-        q5 = q3 * q2
-        A, B, C, D, E = _image_tt(z, h, q, a2, b2)
-        P, Q, S = _image_rt(z, h, q, b2)
-        P_, Q_, S_ = _image_rt(h, z, q, a2)
-        f, m, w = X * fx + Y * fy, X * ty - Y * tx, q5 * (X * tx + Y * ty)
-        along, aside = B * f + D * fz, S_ * m
-        plain = 3.5 * q3 - 6 * Z * Z * q5
-        turn, spin = S * f + P * fz, 4.5 * w + 1.5 * Z * tz * q5
-        out[t] += A * fx + (along + aside) * X + Q_ * ty + q3 * tz * Y
-        out[TILE + t] += A * fy + (along + aside) * Y - Q_ * tx - q3 * tz * X
-        out[2 * TILE + t] += C * f + E * fz - P_ * m
-        out[3 * TILE + t] += plain * tx - Q * fy - turn * Y - spin * X
-        out[4 * TILE + t] += plain * ty + Q * fx + turn * X - spin * Y
-        out[5 * TILE + t] += q3 * (X * fy - Y * fx + 0.5 * tz) + 1.5 * Z * (w - Z * tz * q5)
-
-
-@compiled
-def _overlap_onto_tile(at: Array, source: Array, load: Array, out: Array) -> None:
-    """Add a source's unbounded field to those spheres of a tile that overlap it."""
-    block, r = np.empty((6, 6)), np.empty(3)
-    for t in range(TILE):
-        for i in range(3):
-            r[i] = at[i * TILE + t] - source[i]
-        reach = at[3 * TILE + t] + source[3]
-        if r[0] * r[0] + r[1] * r[1] + r[2] * r[2] < reach * reach:
-            block[:] = 0.0
-            add_free(r, at[3 * TILE + t], source[3], 1.0, block)
-            for i in range(6):
-                for k in range(6):
-                    out[i * TILE + t] += block[i, k] * load[k]
-
-
-@compiled
-def _tile(tile: int, sources: Array, wall: bool, loads: Array, scale: float, velocity: Array) -> None:
-    """Write the velocities of one tile of targets."""
-    count = len(sources)
-    at, out = np.empty(4 * TILE), np.zeros(6 * TILE)
-    for t in range(TILE):
-        for k in range(4):
-            at[k * TILE + t] = sources[min(tile * TILE + t, count - 1), k]
-    for j in range(count):
-        if _free_onto_tile(at, sources[j], loads[j], out):
-            _overlap_onto_tile(at, sources[j], loads[j], out)
-        if wall:
-            _image_onto_tile(at, sources[j], loads[j], out)
-    for t in range(min(TILE, count - tile * TILE)):
-        for k in range(6):
-            velocity[tile * TILE + t, k] = out[k * TILE + t] * scale
-
-
-@compiled_parallel
-def mobility_product(centres: Array, radii: Array, viscosity: float, wall: bool, loads: Array) -> Array:
-    """Give the grand mobility times loads (N, 6), without forming the matrix: velocities (N, 6).
-
-    Tiles of targets go to the threads; each target sums over the sources in their order, so the bits do not depend on
-    the number of threads. The arguments are those of `grand_mobility`.
-    """
-    count = len(radii)
-    sources = np.empty((count, 4))
-    sources[:, :3] = centres
-    sources[:, 3] = radii
-    velocity = np.empty((count, 6))
-    scale = 1 / (8 * math.pi * viscosity)
-    tiles = (count + TILE - 1) // TILE
-    if tiles == 1:  # waking the threads costs more
-        _tile(0, sources, wall, loads, scale, velocity)
-        return velocity
-    for tile in numba.prange(tiles):
-        _tile(tile, sources, wall, loads, scale, velocity)
-    return velocity

@@ -8,7 +8,8 @@ from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Motion, Report
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.krylov import Solution, gmres
-from mpad_core.numerics.stokeslets import mobility_product, self_mobilities
+from mpad_core.numerics.stokeslet_products import mobility_product
+from mpad_core.numerics.stokeslets import self_mobilities
 from mpad_core.numerics.wall_functions import wall_mobility, wall_shear_load
 from mpad_rpb.accuracy import error_of
 from mpad_rpb.lone import wall_inverse
