@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mpad_core.arrays import Array
-from mpad_core.numerics import stokeslet_products, stokeslets
+from mpad_core.numerics import stokeslets
 
 PEERS = Path(__file__).parents[2].parent / "shared" / "peer_refs"
 SCALE = 1 / (8 * np.pi)
@@ -222,14 +222,3 @@ def test_one_inside_another_moves_with_it() -> None:
     assert inside[3:, 3:] == pytest.approx(np.eye(3) / (8 * np.pi * 8), abs=1e-16)
     assert (inside[3:, :3] == 0).all()
     assert inside[:3, 3:] == pytest.approx(-cross_of(np.array([0.2, 0.1, 0.3])) / (8 * np.pi * 8), abs=1e-16)
-
-
-@pytest.mark.parametrize("wall", [True, False])
-@pytest.mark.parametrize("count", [1, 3, 64, 65, 150])
-def test_product_is_the_matrix_times_the_loads(count: int, wall: bool) -> None:
-    rng = np.random.default_rng(count)
-    centres, radii = random_spheres(rng, count, 8.0)
-    loads = rng.normal(size=(count, 6))
-    expected = stokeslets.grand_mobility(centres, radii, 0.7, wall) @ loads.reshape(-1)
-    found = stokeslet_products.mobility_product(centres, radii, 0.7, wall, loads)
-    assert np.linalg.norm(found.reshape(-1) - expected) < 1e-13 * np.linalg.norm(expected)

@@ -36,6 +36,7 @@ from mpad_core.numerics.vectors import aligned_zeros, inverse_root, wide_registe
 
 TILE = 64  # spheres side by side: a few registers of each quantity, and both tiles of a task in the fastest cache
 LOAD, ROOT, MOTION, ROWS = 4, 10, 12, 18  # rows of a tile; the first four are x, y, z and the radius
+ALONE = 2  # up to so many tiles one thread is done before others are awake
 SHARES = 32  # at most so many threads can help; the memory, 24 N SHARES bytes, is what the reactions take
 
 Translation = tuple[float, float, float, float, float]
@@ -120,24 +121,23 @@ def _motion(X: float, Y: float, tt: Translation, rt: Coupling, rr: Rotation, loa
     )
 
 
-@compiled_sums
+@compiled_within
 def _inverse_distances(here: Array, x: float, y: float, h: float, b: float, wall: bool) -> bool:
-    """Write 1/r and 1/R of a tile from a source, zero where spheres overlap, and tell whether any does.
+    """Write 1/r and 1/R of a tile from a source, 1/r = 0 where spheres overlap, and tell whether any does.
 
     A loop of its own: the roots are a long chain of products, of which many then run side by side.
     """
-    wide_registers()
     near = False
     for t in range(TILE):
-        X, Y, d, reach = here[t] - x, here[TILE + t] - y, here[2 * TILE + t] - h, here[3 * TILE + t] + b
-        square = X * X + Y * Y + d * d
+        X, Y, z, reach = here[t] - x, here[TILE + t] - y, here[2 * TILE + t], here[3 * TILE + t] + b
+        flat = X * X + Y * Y
+        square = flat + (z - h) * (z - h)
         overlap = square < reach * reach
         near |= overlap
-        here[ROOT * TILE + t] = 0.0 if overlap else inverse_root(square)
-    if wall:
-        for t in range(TILE):
-            X, Y, Z = here[t] - x, here[TILE + t] - y, here[2 * TILE + t] + h
-            here[(ROOT + 1) * TILE + t] = inverse_root(X * X + Y * Y + Z * Z)
+        root = inverse_root(square)
+        here[ROOT * TILE + t] = 0.0 if overlap else root
+        if wall:
+            here[(ROOT + 1) * TILE + t] = inverse_root(flat + (z + h) * (z + h))
     return near
 
 
@@ -318,34 +318,44 @@ def _share(share: int, starts: Indices, tiles: Array, wall: bool, width: int, ba
         _meet(tiles[i], tiles[i], np.empty(6 * TILE), wall, width)
 
 
-@compiled
-def _gathered(starts: Indices, tiles: Array, back: Array, velocity: Array) -> None:
-    """Write the velocities: of each sphere as a target, and what it got as a source, in the order of the circle."""
-    circle = len(starts) - 1
-    for share in range(circle):
-        for i in range(starts[share] * TILE, min(starts[share + 1] * TILE, len(velocity))):
-            tile, t = i // TILE, i % TILE
-            for k in range(velocity.shape[1]):
-                total = tiles[tile, (MOTION + k) * TILE + t]
-                for further in range(circle // 2 + 1):
-                    total += back[(share - further) % circle, further, tile - starts[share], k * TILE + t]
-                velocity[i, k] = total
-
-
 @compiled_parallel
+def _shares(starts: Indices, tiles: Array, wall: bool, width: int, back: Array) -> None:
+    """Do all shares; nothing else is in here, since numba would do every array expression on all threads."""
+    for share in numba.prange(len(back)):
+        _share(share, starts, tiles, wall, width, back[share])
+
+
+@compiled
+def _gather(starts: Indices, tiles: Array, back: Array, velocity: Array) -> None:
+    """Write the velocities: of each sphere as a target, and what it got as a source, in the order of the circle."""
+    circle, (count, width) = len(back), velocity.shape
+    total = np.empty(TILE)
+    for share in range(circle):
+        for tile in range(starts[share], starts[share + 1]):
+            for k in range(width):
+                for t in range(TILE):
+                    total[t] = tiles[tile, (MOTION + k) * TILE + t]
+                for further in range(circle // 2 + 1):
+                    for t in range(TILE):
+                        total[t] += back[(share - further) % circle, further, tile - starts[share], k * TILE + t]
+                for t in range(min(TILE, count - tile * TILE)):
+                    velocity[tile * TILE + t, k] = total[t]
+
+
+@compiled
 def _product(centres: Array, radii: Array, viscosity: float, wall: bool, loads: Array) -> Array:
     """Give the grand mobility times loads of six columns, or of three if these are forces alone."""
     tiles = tiles_of(centres, radii, 1 / (8 * math.pi * viscosity), loads)
     width, circle = loads.shape[1], min(len(tiles), SHARES)
     starts = np.arange(circle + 1, dtype=np.int64) * len(tiles) // circle
     back = np.empty((circle, circle // 2 + 1, (len(tiles) + circle - 1) // circle, 6 * TILE))
-    if circle == 1:  # waking the threads costs more
-        _share(0, starts, tiles, wall, width, back[0])
-    else:
-        for share in numba.prange(circle):
+    if circle <= ALONE:
+        for share in range(circle):
             _share(share, starts, tiles, wall, width, back[share])
+    else:
+        _shares(starts, tiles, wall, width, back)
     velocity = np.empty(loads.shape)
-    _gathered(starts, tiles, back, velocity)
+    _gather(starts, tiles, back, velocity)
     return velocity
 
 
