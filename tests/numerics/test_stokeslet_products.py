@@ -48,7 +48,7 @@ def test_translation_product_is_the_matrix_times_forces(count: int, wall: bool) 
 @pytest.mark.parametrize("wall", [True, False])
 @pytest.mark.parametrize("column", range(6))
 def test_each_sphere_and_load_to_its_own_size(column: int, wall: bool) -> None:
-    """A unit load on one sphere; every sphere's motion relative to itself, though at the wall two parts cancel in it."""
+    """A unit load on one sphere; every motion relative to itself, though at the wall two parts cancel in it."""
     centres, radii = spheres(150, spread=40.0)
     unit = np.zeros((150, 6))
     unit[70, column] = 1.0
