@@ -25,24 +25,24 @@ def loads(count: int) -> Array:
 
 
 @pytest.mark.parametrize("wall", [True, False])
-@pytest.mark.parametrize("count", [1, 3, 64, 65, 128, 150, 200, 257, 383])
+@pytest.mark.parametrize("count", [0, 1, 3, 64, 65, 128, 150, 200, 257, 383])
 def test_product_is_the_matrix_times_the_loads(count: int, wall: bool) -> None:
     centres, radii = spheres(count)
     grand = grand_mobility(centres, radii, 0.7, wall)
     expected = (grand @ loads(count).reshape(-1)).reshape(count, 6)
     found = mobility_product(centres, radii, 0.7, wall, loads(count))
-    assert np.linalg.norm(found - expected) < 1e-13 * np.linalg.norm(expected)
+    assert np.linalg.norm(found - expected) <= 1e-13 * np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("wall", [True, False])
-@pytest.mark.parametrize("count", [1, 64, 65, 150, 257])
+@pytest.mark.parametrize("count", [0, 1, 64, 65, 150, 257])
 def test_translation_product_is_the_matrix_times_forces(count: int, wall: bool) -> None:
     centres, radii = spheres(count)
     forces = np.ascontiguousarray(loads(count)[:, :3])
     blocks = grand_mobility(centres, radii, 0.7, wall).reshape(count, 6, count, 6)
     expected = np.einsum("ikjm,jm->ik", blocks[:, :3, :, :3], forces)
     found = translation_product(centres, radii, 0.7, wall, forces)
-    assert np.linalg.norm(found - expected) < 1e-13 * np.linalg.norm(expected)
+    assert np.linalg.norm(found - expected) <= 1e-13 * np.linalg.norm(expected)
 
 
 @pytest.mark.parametrize("wall", [True, False])

@@ -261,7 +261,7 @@ def sweep_forces_free(here: Array, there: Array, back: Array) -> None:
     _sweep_forces(here, there, back, False)
 
 
-@compiled
+@compiled_within
 def _meet(here: Array, there: Array, back: Array, wall: bool, width: int) -> None:
     """Let the loads on two tiles move each other's spheres: `here`, and in `back` those `there`."""
     if width == 6:
@@ -304,7 +304,7 @@ def _takes(share: int, further: int, circle: int) -> bool:
 @compiled
 def _share(share: int, starts: Indices, tiles: Array, wall: bool, width: int, back: Array) -> None:
     """Move the spheres of a share, and write to `back` what those further on in the circle get of it."""
-    circle = len(starts) - 1
+    circle, unused = len(starts) - 1, np.zeros(6 * TILE)
     for further in range(circle // 2 + 1):
         other = (share + further) % circle
         back[further] = 0.0
@@ -312,24 +312,23 @@ def _share(share: int, starts: Indices, tiles: Array, wall: bool, width: int, ba
             continue
         for i in range(starts[share], starts[share + 1]):
             for k in range(starts[other], starts[other + 1]):
-                if further > 0 or k > i:
-                    _meet(tiles[i], tiles[k], back[further, k - starts[other]], wall, width)
-    for i in range(starts[share], starts[share + 1]):  # within a tile each sphere is target and source in turn
-        _meet(tiles[i], tiles[i], np.empty(6 * TILE), wall, width)
+                if further > 0 or k >= i:
+                    within = further == 0 and k == i  # where each sphere is target and source in turn
+                    out = unused if within else back[further, k - starts[other]]
+                    _meet(tiles[i], tiles[k], out, wall, width)
 
 
 @compiled_parallel
 def _shares(starts: Indices, tiles: Array, wall: bool, width: int, back: Array) -> None:
-    """Do all shares; nothing else is in here, since numba would do every array expression on all threads."""
+    """Do all shares, each on whatever thread."""
     for share in numba.prange(len(back)):
         _share(share, starts, tiles, wall, width, back[share])
 
 
 @compiled
-def _gather(starts: Indices, tiles: Array, back: Array, velocity: Array) -> None:
-    """Write the velocities: of each sphere as a target, and what it got as a source, in the order of the circle."""
-    circle, (count, width) = len(back), velocity.shape
-    total = np.empty(TILE)
+def _gathered(starts: Indices, tiles: Array, back: Array, count: int, width: int) -> Array:
+    """Give the velocities: of each sphere as a target, and what it got as a source, in the order of the circle."""
+    circle, total, velocity = len(back), np.empty(TILE), np.empty((count, width))
     for share in range(circle):
         for tile in range(starts[share], starts[share + 1]):
             for k in range(width):
@@ -340,23 +339,21 @@ def _gather(starts: Indices, tiles: Array, back: Array, velocity: Array) -> None
                         total[t] += back[(share - further) % circle, further, tile - starts[share], k * TILE + t]
                 for t in range(min(TILE, count - tile * TILE)):
                     velocity[tile * TILE + t, k] = total[t]
+    return velocity
 
 
-@compiled
 def _product(centres: Array, radii: Array, viscosity: float, wall: bool, loads: Array) -> Array:
     """Give the grand mobility times loads of six columns, or of three if these are forces alone."""
     tiles = tiles_of(centres, radii, 1 / (8 * math.pi * viscosity), loads)
-    width, circle = loads.shape[1], min(len(tiles), SHARES)
+    (count, width), circle = loads.shape, max(1, min(len(tiles), SHARES))
     starts = np.arange(circle + 1, dtype=np.int64) * len(tiles) // circle
-    back = np.empty((circle, circle // 2 + 1, (len(tiles) + circle - 1) // circle, 6 * TILE))
+    back = np.empty((circle, circle // 2 + 1, math.ceil(len(tiles) / circle), 6 * TILE))
     if circle <= ALONE:
         for share in range(circle):
             _share(share, starts, tiles, wall, width, back[share])
     else:
         _shares(starts, tiles, wall, width, back)
-    velocity = np.empty(loads.shape)
-    _gather(starts, tiles, back, velocity)
-    return velocity
+    return _gathered(starts, tiles, back, count, width)
 
 
 def mobility_product(centres: Array, radii: Array, viscosity: float, wall: bool, loads: Array) -> Array:
