@@ -149,7 +149,7 @@ def _add_overlaps(here: Array, there: Array, s: int, width: int, back: Array) ->
         a, b = here[3 * TILE + t], there[3 * TILE + s]
         for i in range(3):
             r[i] = here[i * TILE + t] - there[i * TILE + s]
-        if a == 0 or r[0] * r[0] + r[1] * r[1] + r[2] * r[2] >= (a + b) * (a + b):  # no sphere, or apart
+        if r[0] * r[0] + r[1] * r[1] + r[2] * r[2] >= (a + b) * (a + b):
             continue
         block[:] = 0.0
         add_free(r, a, b, 1.0, block)
@@ -165,7 +165,7 @@ def _sweep(here: Array, there: Array, back: Array, wall: bool) -> None:
     wide_registers()
     for s in range(TILE):
         x, y, h, b = there[s], there[TILE + s], there[2 * TILE + s], there[3 * TILE + s]
-        if b == 0:  # no sphere
+        if b == 0:  # no sphere, no load
             continue
         fx, fy, fz = there[LOAD * TILE + s], there[(LOAD + 1) * TILE + s], there[(LOAD + 2) * TILE + s]
         tx, ty, tz = there[(LOAD + 3) * TILE + s], there[(LOAD + 4) * TILE + s], there[(LOAD + 5) * TILE + s]
@@ -210,7 +210,7 @@ def _sweep_forces(here: Array, there: Array, back: Array, wall: bool) -> None:
     wide_registers()
     for s in range(TILE):
         x, y, h, b = there[s], there[TILE + s], there[2 * TILE + s], there[3 * TILE + s]
-        if b == 0:  # no sphere
+        if b == 0:  # no sphere, no load
             continue
         fx, fy, fz = there[LOAD * TILE + s], there[(LOAD + 1) * TILE + s], there[(LOAD + 2) * TILE + s]
         if _inverse_distances(here, x, y, h, b, wall):
