@@ -1,8 +1,8 @@
 r"""Products of the grand mobility of `stokeslets` with loads on many spheres, without forming the matrix.
 
 Of a target at height z and a source at h let X∥ be the part along the wall of what separates them, d = z - h and
-Z = z + h, p = 1/r and q = 1/R the inverse distances to the source and to its image. Both fields turn with X∥, so they
-share the two products of the load with X∥ and may be added before the load is known, in units of 1/(8πη):
+Z = z + h, p = 1/r and q = 1/R the inverse distances to the source and to its image. The vertical through the source is
+the axis of both fields, so they are added before the load is known, in units of 1/(8πη):
 
     U∥ = A F∥ + (B X∥·F∥ + D F_z + S' m) X∥ - Q' ẑ×T∥ - k T_z ẑ×X∥,          m = ẑ·X∥×T∥
     U_z = C X∥·F∥ + E F_z - P' m
@@ -47,7 +47,7 @@ Six = tuple[float, float, float, float, float, float]
 
 @compiled_within
 def _translation(z: float, h: float, p: float, q: float, a2: float, b2: float, wall: bool) -> Translation:
-    """Give A, B, C, D, E of the module's text."""
+    """Give A, B, C, D, E of the module's text; the wall's part is that of `stokeslets`, ordered by powers of q²."""
     d, p3, s = z - h, p * p * p, a2 * (1 / 3) + b2 * (1 / 3)
     u = s * p * p
     A, B = p + p * u, p3 - 3 * u * p3
