@@ -36,9 +36,7 @@ from mpad_core.numerics.vectors import aligned_zeros, inverse_root, wide_registe
 
 TILE = 64  # spheres side by side: a few registers of each quantity, and both tiles of a task in the fastest cache
 LOAD, ROOT, MOTION, ROWS = 4, 10, 12, 18  # rows of a tile; the first four are x, y, z and the radius
-ALONE = (
-    4  # so many tiles take one thread 0.2 ms; waking others saves half of it at best, and on a busy machine costs more
-)
+ALONE = 4  # so many tiles take one thread 0.2 ms; waking others saves half of it, and on a busy machine costs more
 SHARES = 32  # at most so many threads can help; the memory, 24 N SHARES bytes, is what the reactions take
 
 Translation = tuple[float, float, float, float, float]
