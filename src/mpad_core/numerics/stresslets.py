@@ -37,6 +37,7 @@ import numpy as np
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled, compiled_parallel, compiled_sums, compiled_within
 from mpad_core.numerics.stresslet_images import Eleven, couple, harmonics, mutual, rising, turned
+from mpad_core.numerics.vectors import wide_registers
 
 TILE = 32  # spheres side by side in the product: a few vector registers of each quantity
 SHARES = 32  # of the product, the most threads that it can use; each takes memory for all motions, 88 bytes a sphere
@@ -212,6 +213,7 @@ def _add_at(work: Array, start: int, motion: Eleven) -> None:
 @compiled_sums
 def _free_onto_tile(work: Array, source: Array, load: Array, first: int) -> None:
     """Add the unbounded motions of a tile's spheres, from the first on, by a source, and those that they give it."""
+    wide_registers()
     x, y, z, b2, sent = source[0], source[1], source[2], source[3] * source[3], _taken(load)
     for t in range(TILE):
         X, Y, Z, a2 = work[t] - x, work[TILE + t] - y, work[2 * TILE + t] - z, work[3 * TILE + t] ** 2
@@ -225,6 +227,7 @@ def _free_onto_tile(work: Array, source: Array, load: Array, first: int) -> None
 @compiled_sums
 def _image_onto_tile(work: Array, source: Array, load: Array, first: int) -> None:
     """Add what the wall adds to these motions."""
+    wide_registers()
     x, y, h, b2, sent = source[0], source[1], source[2], source[3] * source[3], _taken(load)
     for t in range(TILE):
         z, a2 = work[2 * TILE + t], work[3 * TILE + t] ** 2
@@ -239,6 +242,7 @@ def _image_onto_tile(work: Array, source: Array, load: Array, first: int) -> Non
 @compiled_sums
 def _tiles(i: int, j: int, spheres: Array, loads: Array, count: int, wall: bool, motions: Array) -> None:
     """Add the motions of tile i's spheres by tile j's, and those of j's by i's."""
+    wide_registers()
     work = np.zeros(WORK)
     for t in range(TILE):
         for k in range(4):
