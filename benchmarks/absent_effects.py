@@ -1,8 +1,8 @@
 """What an effect costs that is not there: the burst with empty tables against one that never knew the effect.
 
 The burst treats an absent effect as tables and lists of length zero, and never asks. Here the same sources are compiled
-once more with every call and loop that belongs to bonds and contacts struck out, and both are timed in turn (CPU time
-of the thread) on scenes without bonds and repulsion; they must also give the same bits. Then each part by itself.
+once more with every call and loop that belongs to bonds, contacts and thermal motion struck out, and both are timed in
+turn (CPU time of the thread) on scenes without any; they must also give the same bits. Then each part by itself.
 
     python benchmarks/absent_effects.py [--repeats 31] [--sub-steps 2000]
 """
@@ -45,11 +45,12 @@ height = "6 um"
 """
 STRUCK = {  # what each bare burst does without: calls, loops over what is absent, and conditions
     "everything": ("break_bonds", "form_bonds", "attach", "_list_is_short", "attached.first", "contacts.pair_first",
-                   "contacts.reach"),
+                   "contacts.reach", "thermal.energy", "draw"),
     "reactions": ("break_bonds", "form_bonds", "_list_is_short"),
     "sorting of bonds": ("attach",),
     "loads of bonds": ("attached.first",),
     "contacts": ("contacts.pair_first", "contacts.reach"),
+    "thermal motion": ("thermal.energy", "draw"),
 }  # fmt: skip
 
 
@@ -104,10 +105,7 @@ def plainly(function: Any) -> Any:
 def bare_burst(gone: Sequence[str]) -> Any:
     """Give a burst that never knew what is gone."""
     moving_names, in_moving = without(moving, gone, {})
-    own = {
-        name: moving_names[name] for name in ("DONE", "TOO_LONG", "advance", "attach", "is_positive_definite",
-                                               "refresh_turns", "resistance")
-    }  # fmt: skip
+    own = {name: moving_names[name] for name in ("DONE", "TOO_LONG", "advance", "attach", "refresh_turns")}
     burst_names, in_burst = without(burst, gone, own)
     assert in_moving + in_burst >= len(gone), f"not all of {gone} was found"
     return burst_names["burst"]

@@ -177,7 +177,7 @@ class TestBadInput:
     @pytest.mark.parametrize("setting", [
         "cells.free.y", "cells.free.y=", "=1", "", "cells.free.y=7.5", 'cells.nobody.y="1 um"', "stop=1", "seed=-1",
         'solver="rbp"', 'cells.free.y="7.5 s"', "a.b.c.d=1", "[x]=1", "seed=1\nseed=2", 'solver.name="rpb"=1',
-        "cells.free.height=nan", 'bonds.tether.model.off_rate="-1 1/s"', 'effects.thermal="on"',
+        "cells.free.height=nan", 'bonds.tether.model.off_rate="-1 1/s"', 'effects.thermal="hot"',
         'effects.coupling="perhaps"', 'wall.sites.p-selectin.density="-1 1/um^2"', 'fluid.viscosity="0 Pa s"',
     ])  # fmt: skip
     def test_a_setting_that_makes_no_sense(self, setting, mpad):

@@ -42,6 +42,7 @@ def _text(
     cells: dict[str, str], *, solver: str = "isolated", shear: float = 0.0, excess: float = 0.0, wall: bool = True,
     bond: dict[str, Any] | None = None, repulsion: bool = False, position: float = 1e-4, rate: float = 1e-3,
     sites: float = 90.0, wall_sites: float = 180.0, seed: int = 1, stop: str = 'time = "1 s"', more: str = "",
+    thermal: str = "off",
 ) -> str:  # fmt: skip
     """Write a scene of beads of 5 µm; `excess` (kg/m³) makes them heavier than water, each cell is its keys in TOML."""
     lines = [
@@ -59,6 +60,7 @@ def _text(
         *(f'[cells.{name}]\nkind = "bead"\n{keys}' for name, keys in cells.items()),
         _BOND.format(**(_BOND_DEFAULTS | bond)) if bond is not None else "",
         '[repulsion]\nstrength = "500 pN um"\ndecay = "565 1/um"' if repulsion else "",
+        f'[effects]\nthermal = "{thermal}"',
         more,
     ]
     return "\n".join(line for line in lines if line)

@@ -17,10 +17,9 @@ from mpad_core.running.moving import (
     TOO_LONG,
     advance,
     attach,
-    is_positive_definite,
     refresh_turns,
-    solve_in_place,
 )
+from mpad_core.running.resisting import is_positive_definite, solve_in_place
 
 STIFFNESS, REST, STRENGTH, DECAY = 1e5, 0.03, 500.0, 565.0
 
@@ -53,8 +52,9 @@ class Bench:
         )
         return load, stiffness
 
-    def advance(self, dt: float, group: int = 0) -> int:
-        return int(advance(group, dt, self.system, self.bonds, self.attached, self.motion))
+    def advance(self, dt: float, group: int = 0, noise: Any = ()) -> int:
+        shaken = np.array(noise, float)
+        return int(advance(group, dt, self.system, self.bonds, self.attached, self.motion, shaken))
 
 
 def assembly_configuration(problem: Any, state: Any) -> Any:

@@ -160,7 +160,7 @@ def room_to_move(centres: Array, radii: Array, wall_gaps: Array | None) -> Array
     return np.maximum(room, 1e-9 * np.asarray(radii))
 
 
-def divergence(product_at: ProductAt, room: Array, noise: Array | None = None) -> Array:
+def divergence(product_at: ProductAt, room: Array, noise: Array | None = None, *, share: float = STEP) -> Array:
     """Give ∇·M (N, 6), or an unbiased estimate of it; the module's text says how.
 
     Parameters
@@ -171,12 +171,14 @@ def divergence(product_at: ProductAt, room: Array, noise: Array | None = None) -
         From `room_to_move`.
     noise : (N, 3), optional
         Independent numbers of mean 0 and variance 1: one random difference, two products instead of 6N.
+    share
+        δ, of the room.
     """
     directions = np.eye(3 * len(room)).reshape(-1, len(room), 3) if noise is None else np.asarray(noise)[None]
     total = np.zeros((len(room), 6))
     for w in directions:
-        shift = STEP * room[:, None] * w
+        shift = share * room[:, None] * w
         loads = np.zeros((len(room), 6))
         loads[:, :3] = w / room[:, None]
-        total += (product_at(shift, loads) - product_at(-shift, loads)) / (2 * STEP)
+        total += (product_at(shift, loads) - product_at(-shift, loads)) / (2 * share)
     return total

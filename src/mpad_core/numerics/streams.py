@@ -5,6 +5,7 @@ generator state to keep. Philox4x32-10: Salmon, Moraes, Dror & Shaw, "Parallel r
 SC'11.
 """
 
+import math
 from enum import IntEnum
 from typing import Any, TypeAlias
 
@@ -89,6 +90,14 @@ def uniform_pair(key: Word, stream: int, identity: Word, step: int) -> tuple[flo
 def uniform(key: Word, stream: int, identity: Word, step: int) -> float:
     """Draw one uniform number in (0, 1); see `uniform_pair`."""
     return uniform_pair(key, stream, identity, step)[0]
+
+
+@compiled
+def normal_pair(key: Word, stream: int, identity: Word, step: int) -> tuple[float, float]:
+    """Draw two independent standard normal numbers by the method of Box and Muller; arguments as `uniform_pair`."""
+    first, second = uniform_pair(key, stream, identity, step)
+    radius, angle = math.sqrt(-2 * math.log(first)), 2 * math.pi * second
+    return radius * math.cos(angle), radius * math.sin(angle)
 
 
 @compiled

@@ -19,10 +19,9 @@ from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
 from mpad_core.physics import asking
-from mpad_core.physics.problem import Problem
+from mpad_core.physics.problem import LARGEST_GROUP, Problem
 from mpad_core.physics.questions import constrained_motion, unit_load
 
-LARGEST_GROUP = 8  # cells: a burst's cost grows with the cube
 NOT_FELT = 1e12  # radii: the wall functions are those of an unbounded fluid to the last bit at this gap
 _ROOM_TO_MOVE = 1.25  # of the reach of contact
 _ASYMMETRY = 0.1  # of sqrt(M_ii M_jj): coarse boundary elements reach 0.03 (near contact), and are symmetrised
@@ -199,6 +198,31 @@ class SolverCoupling:
                 wanted = lone @ motion.velocity[cell] + coupled[place]
                 loads[cell] = wanted - mean_loads[cell] - ambient
         return motion.guess
+
+
+class Drift(Protocol):
+    """Adds to a coupling what thermal motion asks of it."""
+
+    def added(self, coupling: Coupling, configuration: Configuration, step: int) -> Coupling:
+        """Give the coupling with further loads; `step` is the sub-step's number, by which draws are keyed."""
+        ...
+
+
+class NoDrift:
+    """The null object: no thermal motion, or a coupling that does not change."""
+
+    def added(self, coupling: Coupling, configuration: Configuration, step: int) -> Coupling:
+        """Give the coupling as it is."""
+        return coupling
+
+
+def drift_of(problem: Problem, coupling: Coupler) -> Drift:
+    """Give the drift that a coupling misses while it is frozen."""
+    if problem.thermal_energy == 0 or not isinstance(coupling, SolverCoupling):
+        return NoDrift()
+    from mpad_core.physics.fluctuations import CouplingDrift
+
+    return CouplingDrift(problem=problem, coupling=coupling)
 
 
 def contact_reach(problem: Problem) -> float:

@@ -13,6 +13,7 @@ from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.surface import Surface
 from mpad_core.interfaces.values import Setting
 
+LARGEST_GROUP = 8  # cells whose coupling is solved together within a burst, whose cost grows with the cube
 _PER_CELL = (
     *("radii", "roughness", "held", "site_densities", "hazard_densities", "start", "alone_for", "zero_overlap"),
     *("external", "dx_from"),
@@ -87,6 +88,7 @@ class Problem:
     tolerances: Tolerances
     caught: CaughtWhen
     seed: int
+    thermal_energy: float = 0.0  # pN µm, kT of the cells' thermal motion; 0 where there is none
     effects: tuple[Effect, ...] = ()
     site_kinds: tuple[str, ...] = field(default=())
 

@@ -12,7 +12,7 @@ from mpad_core.physics.coupling import NOT_FELT, Coupling
 from mpad_core.physics.molecules import identity_of, place_sites
 from mpad_core.physics.problem import BondSpecies, Problem
 from mpad_core.physics.state import BondList, State
-from mpad_core.running.layout import Bodies, Bonds, Contacts, Groups, Molecules, Motion, Species, System
+from mpad_core.running.layout import Bodies, Bonds, Contacts, Groups, Molecules, Motion, Species, System, Thermal
 from mpad_core.running.reacting import MOST_LIGANDS, SQUARE
 
 _FORCE_ERROR = 1e-6  # relative, of the tabulated repulsion
@@ -25,6 +25,7 @@ class Fixed:
     bodies: Bodies
     molecules: Molecules
     species: Species
+    thermal: Thermal
     contact_law: Tables
     contact_reach: float  # µm; minus infinity without a law
     reference_density: Array  # (K,) 1/µm²
@@ -95,6 +96,7 @@ def assemble(problem: Problem) -> Fixed:
             sites.arm, sites.first, sites.kind, np.array([identity_of(n) for n in problem.names]).view(np.int64)
         ),
         species=_species(problem),
+        thermal=Thermal(np.full(1 if problem.thermal_energy > 0 else 0, problem.thermal_energy)),
         contact_law=law,
         contact_reach=reach,
         reference_density=np.array([s.at_density for s in problem.species]),
@@ -157,7 +159,7 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
     first = np.searchsorted(np.sort(owner), np.arange(len(sizes) + 1))
     contacts = Contacts(fixed.contact_law, fixed.contact_reach, np.ascontiguousarray(pairs), first)
     density = local_density(problem, fixed, state.centres)
-    return System(fixed.bodies, fixed.molecules, fixed.species, contacts, groups, density)
+    return System(fixed.bodies, fixed.molecules, fixed.species, contacts, groups, fixed.thermal, density)
 
 
 def bond_room(bonds: BondList, room: int) -> Bonds:

@@ -7,12 +7,14 @@ import numpy as np
 
 from mpad_core.arrays import Array, Flags, Indices
 from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.streams import Word
 from mpad_core.running.layout import Attached, Bonds, Dice, Limits, Motion, System
-from mpad_core.running.moving import DONE, TOO_LONG, advance, attach, is_positive_definite, refresh_turns, resistance
+from mpad_core.running.moving import DONE, TOO_LONG, advance, attach, refresh_turns
 from mpad_core.running.reacting import break_bonds, form_bonds, list_candidates
+from mpad_core.running.resisting import is_positive_definite, resistance
+from mpad_core.running.shaking import TICKS, draw
 
 REACHED, ROOM_NEEDED, NOT_POSITIVE, NO_BALANCE = 0, 1, 2, 3  # why a burst ended
-_TICKS = 1 << 16  # a sub-step is never split finer
 _LISTING_MARGIN = 0.03  # µm: molecules this far out of reach are listed too, and the list stands until they could reach
 
 
@@ -71,14 +73,18 @@ def _list_is_short(motion: Motion, listing: _Listing) -> bool:
 
 @compiled
 def _move_group(
-    group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, turns: Array
-) -> int:
-    """Move a group over a sub-step, in as many parts as it takes."""
-    left = _TICKS
-    part = _TICKS
+    group: int, step: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, turns: Array,
+    key: Word,
+) -> int:  # fmt: skip
+    """Move a group over sub-step `step`, in as many parts as it takes."""
+    left = TICKS
+    part = TICKS
+    size = 6 * (system.groups.first[group + 1] - system.groups.first[group])
+    noise = np.empty(system.thermal.energy.shape[0] * size)
     while left > 0:
         part = min(part, left)
-        outcome = advance(group, dt * part / _TICKS, system, bonds, attached, motion)
+        draw(group, system, key, step, TICKS - left, TICKS - left + part, dt, noise)
+        outcome = advance(group, dt * part / TICKS, system, bonds, attached, motion, noise)
         if outcome == DONE:
             left -= part
             part *= 2
@@ -115,7 +121,7 @@ def _refused_group(system: System, motion: Motion) -> int:
     for group in range(system.groups.first.shape[0] - 1):
         m = 6 * (system.groups.first[group + 1] - system.groups.first[group])
         matrix, right = np.empty((m, m)), np.empty(m)
-        resistance(group, system, motion, matrix, right)
+        resistance(group, system, motion.gap, matrix, right)
         if not is_positive_definite(matrix):
             return group
     return -1
@@ -167,7 +173,7 @@ def burst(
             )
             attach(bonds, system.molecules, turns, attached)
         for group in range(groups):
-            outcome = _move_group(group, dt, system, bonds, attached, motion, turns)
+            outcome = _move_group(group, step, dt, system, bonds, attached, motion, turns, dice.key)
             if outcome != REACHED:
                 return outcome, done, group
         if _must_end(motion, limits):

@@ -73,6 +73,12 @@ class Groups(NamedTuple):
     load: Array  # (N, 6) k + g: what the coupling adds to the loads
 
 
+class Thermal(NamedTuple):
+    """Thermal motion."""
+
+    energy: Array  # (1,) kT, pN µm; (0,) where there is no thermal motion
+
+
 class System(NamedTuple):
     """All that a burst reads and does not change."""
 
@@ -81,6 +87,7 @@ class System(NamedTuple):
     species: Species
     contacts: Contacts
     groups: Groups
+    thermal: Thermal
     density_ratio: Array  # (N, K) the wall's site density under each cell, by the one that the on-rate is given at
 
 

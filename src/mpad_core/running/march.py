@@ -15,7 +15,7 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import BOND_EVENT, Configuration
 from mpad_core.numerics.tables import value
-from mpad_core.physics.coupling import Coupler, Coupling, contact_range, coupler, lone_velocity
+from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, coupler, drift_of, lone_velocity
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State
 from mpad_core.running import assembly, pace
@@ -35,6 +35,7 @@ class Machine:
     fixed: assembly.Fixed
     pace: pace.Pace
     coupler: Coupler
+    drift: Drift
 
     def lengths_and_tensions(self, state: State) -> tuple[Array, Array]:
         """Give the length (µm) and tension (pN) of every living bond."""
@@ -54,7 +55,11 @@ def make_ready(problem: Problem, plan: Any = None) -> Machine:
     `plan` is one that the solver has made already, for this problem or for another in the same fluid.
     """
     fixed = assembly.assemble(problem)
-    return Machine(problem=problem, fixed=fixed, pace=pace.choose_pace(problem, fixed), coupler=coupler(problem, plan))
+    coupling = coupler(problem, plan)
+    return Machine(
+        problem=problem, fixed=fixed, pace=pace.choose_pace(problem, fixed), coupler=coupling,
+        drift=drift_of(problem, coupling),
+    )  # fmt: skip
 
 
 def configuration_of(problem: Problem, state: State) -> Configuration:
@@ -90,7 +95,7 @@ def step(machine: Machine, state: State, until: float) -> State:
     moves = pace.pair_moves(problem, _coupled_pairs(machine, state), state.centres, machine.pace.share)
     length = pace.expected_length(machine.pace, moves, state.drift)
     middle = _ahead(problem, state, 0.5 * min(length, until - state.time))
-    coupling = machine.coupler.at(middle, state.mean_loads, state.guess)
+    coupling = machine.drift.added(machine.coupler.at(middle, state.mean_loads, state.guess), middle, state.step)
     left = until - state.time
     bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, left)
     return _burst(machine, state, coupling, bounds)

@@ -3,6 +3,9 @@
 Backward Euler for  r_i(h_i) U_i + Σ_j C_ij U_j = F_i + f_i(h_i) + k_i + g_i : bonds and repulsion are taken at the end
 of the sub-step by Newton's method with their full stiffness (taut or slack, geometric), the exact wall resistance r and
 the ambient load f at its start. Semi-implicit short cuts give rolling speeds several times too high.
+
+With thermal motion the random load of the sub-step stands on the right, and r and f are taken at the heights that the
+random load alone would reach in half the sub-step; see `shaking`.
 """
 
 import math
@@ -13,56 +16,15 @@ from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.rotations import matrix_of, turned, turned_vector
 from mpad_core.numerics.tables import Tables, value_and_slope
-from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
 from mpad_core.running.layout import Attached, Bonds, Molecules, Motion, Species, System
 from mpad_core.running.reacting import TENSION
+from mpad_core.running.resisting import resistance, solve_in_place
+from mpad_core.running.shaking import GAP_SHARE, shake
 
 DONE, TOO_LONG = 0, 1
 _MOST_ITERATIONS = 25
 _CLOSE = 1e-8  # µm: Newton has converged when its step moves no surface by more
-_GAP_SHARE = 0.2  # of the gap to the wall that one sub-step may cross
 _LARGEST_TURN = 0.1  # rad in one sub-step
-
-
-@compiled
-def is_positive_definite(matrix: Array) -> bool:
-    """Tell whether a symmetric matrix has a Cholesky factor; the matrix is overwritten."""
-    m = matrix.shape[0]
-    for j in range(m):
-        for k in range(j):
-            for i in range(j, m):
-                matrix[i, j] -= matrix[i, k] * matrix[j, k]
-        if not matrix[j, j] > 0:
-            return False
-        root = math.sqrt(matrix[j, j])
-        for i in range(j, m):
-            matrix[i, j] /= root
-    return True
-
-
-@compiled
-def solve_in_place(matrix: Array, right: Array) -> None:
-    """Solve by Gaussian elimination with partial pivoting; the answer replaces `right`, the matrix is overwritten."""
-    m = matrix.shape[0]
-    for k in range(m):
-        pivot = k
-        for i in range(k + 1, m):
-            if abs(matrix[i, k]) > abs(matrix[pivot, k]):
-                pivot = i
-        if pivot != k:
-            for j in range(k, m):
-                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
-            right[k], right[pivot] = right[pivot], right[k]
-        for i in range(k + 1, m):
-            factor = matrix[i, k] / matrix[k, k]
-            if factor != 0.0:
-                for j in range(k + 1, m):
-                    matrix[i, j] -= factor * matrix[k, j]
-                right[i] -= factor * right[k]
-    for k in range(m - 1, -1, -1):
-        for j in range(k + 1, m):
-            right[k] -= matrix[k, j] * right[j]
-        right[k] /= matrix[k, k]
 
 
 @compiled
@@ -196,28 +158,6 @@ def attach(bonds: Bonds, molecules: Molecules, turns: Array, out: Attached) -> N
 
 
 @compiled
-def resistance(group: int, system: System, motion: Motion, matrix: Array, right: Array) -> None:
-    """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at the present heights."""
-    bodies, groups = system.bodies, system.groups
-    start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
-    size = 36 * n * n
-    offset = groups.coupling_first[group]
-    matrix[:, :] = groups.coupling[offset : offset + size].reshape(6 * n, 6 * n)
-    own = np.empty((6, 6))
-    ambient = np.empty(6)
-    for place in range(n):
-        cell = groups.cells[start + place]
-        o = 6 * place
-        radius = bodies.radius[cell]
-        height = motion.gap[cell] + radius
-        felt = motion.gap[cell] + bodies.wall_offset
-        wall_resistance(height, felt, radius, bodies.viscosity, own)
-        wall_shear_load(height, felt, radius, bodies.viscosity, bodies.shear_rate, ambient)
-        matrix[o : o + 6, o : o + 6] += own
-        right[o : o + 6] = ambient + groups.load[cell]
-
-
-@compiled
 def _largest_move(change: Array, dt: float, radii: Array) -> float:
     """Give the largest displacement of a surface that a change of the velocities makes in dt."""
     largest = 0.0
@@ -274,20 +214,28 @@ def _newton(
 
 
 @compiled
-def advance(group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion) -> int:
-    """Move a group over dt; give DONE, or what stopped it, in which case nothing has changed."""
+def advance(
+    group: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, noise: Array
+) -> int:
+    """Move a group over dt; give DONE, or what stopped it, in which case nothing has changed.
+
+    `noise` (6n,) are the increments (s^½) of the Brownian paths over dt, empty where there is no thermal motion.
+    """
     groups = system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
     matrix = np.empty((6 * n, 6 * n))
     right, load, velocity = np.empty(6 * n), np.empty(6 * n), np.empty(6 * n)
-    resistance(group, system, motion, matrix, right)
+    resistance(group, system, motion.gap, matrix, right)
+    for k in range(system.thermal.energy.shape[0]):
+        if not shake(group, dt, system.thermal.energy[k], noise, system, motion.gap, matrix, right):
+            return TOO_LONG
     for place in range(n):
         velocity[6 * place : 6 * place + 6] = motion.velocity[groups.cells[start + place]]
     if not _newton(group, dt, matrix, right, system, bonds, attached, motion, velocity, load):
         return TOO_LONG
     for place in range(n):
         gap = motion.gap[groups.cells[start + place]]
-        if -velocity[6 * place + 2] * dt > _GAP_SHARE * (gap + system.bodies.wall_offset):
+        if -velocity[6 * place + 2] * dt > GAP_SHARE * (gap + system.bodies.wall_offset):
             return TOO_LONG
         if math.sqrt(np.sum(velocity[6 * place + 3 : 6 * place + 6] ** 2)) * dt > _LARGEST_TURN:
             return TOO_LONG

@@ -16,6 +16,7 @@ from mpad_core.running.reacting import OFF_RATE, ON_RATE
 _MOST_SUB_STEPS = 1000  # in one burst, so that a run can be told to stop
 _GAP_CHANGE = 0.2  # of a cell's gap to the wall over which the frozen coupling may be combined with r(h)
 _LARGEST_SUB_STEP = 1e-3  # s, where nothing else bounds it
+_THERMAL_SHARE = 0.2  # of gaps and of the repulsion's range that thermal motion may cross in a sub-step
 _VERTICAL = 0.01  # vertical velocities are this fraction of the flow's past a cell, or less
 
 
@@ -40,6 +41,7 @@ def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
     bounds = [_LARGEST_SUB_STEP]
     bounds += [2 * tolerances.rate / rate for rate in _fastest(problem, fixed) if rate > 0]
     settling = np.abs(problem.external[:, :3]).max() / (6 * np.pi * problem.setting.viscosity * problem.radii.min())
+    bounds += _thermal_steps(problem)
     vertical = _VERTICAL * abs(problem.setting.shear_rate) * float(problem.radii.max()) + float(settling)
     if vertical > 0:
         bounds.append(2 * tolerances.position / vertical)
@@ -48,6 +50,47 @@ def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
     longest = max(0.1 / shear if shear > 0 else 0.01, sub_step)
     share = float(np.clip(0.02 * np.sqrt(tolerances.position / 1e-4), 0.002, 0.1))
     return Pace(sub_step=sub_step, longest=longest, share=share)
+
+
+def _thermal_steps(problem: Problem) -> list[float]:
+    """Give the sub-steps (s) in which thermal motion crosses a small part of what it may not jump over; none without.
+
+    A cell's rms displacement (2 kT M Δt)^½ across a gap g is to be at most `_THERMAL_SHARE` of g and of the length ℓ
+    over which repulsion takes up kT. In a repulsion of stiffness kT/ℓ², backward Euler makes the variance too small by
+    the share kT M Δt/(2ℓ²): `_THERMAL_SHARE`²/4 or less, 1 %. M is g/(6πηa²) near a wall, four times that between two
+    cells, and at most Stokes'. A gap that becomes narrower than where it was bounded here splits the sub-step.
+    """
+    kT, radius = problem.thermal_energy, float(problem.radii.min())
+    if kT == 0:
+        return []
+    stokes = 1 / (6 * np.pi * problem.setting.viscosity * radius)
+    length, tips = _repelling(problem)
+    steps = []
+    if problem.setting.wall:
+        lowest = float((problem.start[:, 2] - problem.radii).min())
+        gap = float(problem.roughness.min()) + problem.wall_roughness + tips if tips > 0 else lowest
+        mobility = stokes * min(gap / radius, 1.0)
+        steps.append((_THERMAL_SHARE * min(length, gap)) ** 2 / (2 * kT * mobility))
+    if len(problem.radii) > 1 and tips > 0:
+        gap = 2 * float(problem.roughness.min()) + tips
+        mobility = stokes * (min(4 * gap / radius, 2.0) if problem.coupled else 2.0)
+        steps.append((_THERMAL_SHARE * min(length, gap)) ** 2 / (2 * kT * mobility))
+    return steps
+
+
+def _repelling(problem: Problem) -> tuple[float, float]:
+    """Give the length ℓ over which repulsion takes up kT, kT over the force at the tip gap of that energy; that gap.
+
+    Infinity and 0 without repulsion.
+    """
+    if problem.contact is None:
+        return np.inf, 0.0
+    low, high = problem.contact.gaps()
+    gaps = np.linspace(low, high, 20_001)
+    force = problem.contact.force(gaps)
+    energy = np.cumsum(force[::-1])[::-1] * (gaps[1] - gaps[0])
+    k = max(int(np.searchsorted(-energy, -problem.thermal_energy)) - 1, 0)
+    return problem.thermal_energy / float(force[k]), float(gaps[k])
 
 
 def _fastest(problem: Problem, fixed: Fixed) -> list[float]:

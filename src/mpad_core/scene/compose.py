@@ -73,6 +73,7 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         tolerances=Tolerances(position=scene.accuracy.position, rate=scene.accuracy.rate),
         caught=CaughtWhen(bound_for=scene.record.caught.bound_for, slower_than=scene.record.caught.slower_than),
         seed=scene.seed,
+        thermal_energy=thermal_energy(scene.fluid.temperature) if effects["thermal"].on else 0.0,
         effects=tuple(effects.values()),
         site_kinds=_site_names(scene),
     )

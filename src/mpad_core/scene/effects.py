@@ -1,5 +1,6 @@
 """Which effects a scene calls for, and why."""
 
+import math
 from collections.abc import Callable
 
 import attrs
@@ -7,17 +8,24 @@ from attrs import frozen
 
 from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.values import SolverTraits
-from mpad_core.physics.problem import Effect
+from mpad_core.physics.problem import LARGEST_GROUP, Effect
 from mpad_core.scene.spec import Scene
+from mpad_core.units import thermal_energy
+
+_PECLET = 1000.0  # flow carries a cell this many times farther than heat, in the time of one radius
 
 
 @frozen
 class Call:
-    """Whether a scene calls for an effect, and why; ``lacking``: why it cannot be had even if asked for."""
+    """Whether there is anything for an effect to act on, and why.
+
+    ``lacking``: why it cannot be had even if asked for. ``matters``: whether it does enough to be on unasked.
+    """
 
     wanted: bool
     why: str
     lacking: str = ""
+    matters: bool = True
 
 
 def _shear(scene: Scene, traits: SolverTraits) -> Call:
@@ -72,10 +80,18 @@ def _lubrication(scene: Scene, traits: SolverTraits) -> Call:
 
 
 def _thermal(scene: Scene, traits: SolverTraits) -> Call:
-    return Call(
-        False, "not among the effects of this version; see `spread` for what is left out",
-        "thermal motion is not among the effects of this version",
-    )  # fmt: skip
+    kinds = {cell.kind for cell in scene.cells.values()} | {group.kind for group in scene.groups.values()}
+    radius = min(scene.kinds[kind].radius for kind in kinds)
+    peclet = 6 * math.pi * scene.fluid.viscosity * radius**3 * abs(scene.flow.rate)
+    peclet /= thermal_energy(scene.fluid.temperature)
+    matters = peclet < _PECLET
+    what = f"Peclet number 6 pi mu a^3 gamma / kT = {peclet:.3g} of the smallest cells"
+    why = f"{what}, less than {_PECLET:g}" if matters else f"{what}; see `spread` for what is left out"
+    why = "no flow to outdo it" if peclet == 0 else why
+    number = len(scene.cells) + sum(group.number for group in scene.groups.values())
+    if matters and traits.coupling and number > LARGEST_GROUP:
+        why += f"; more than {LARGEST_GROUP} cells: those far apart move independently of each other"
+    return Call(True, why, matters=matters)
 
 
 _CALLS: dict[str, Callable[[Scene, SolverTraits], Call]] = {
@@ -97,7 +113,7 @@ def decide(scene: Scene, traits: SolverTraits) -> dict[str, Effect]:
         call = _CALLS[name](scene, traits)
         if switch == "on" and not call.wanted and call.lacking:
             faults.append(f'effects.{name}: "on", but {call.lacking}')
-        on = call.wanted if switch == "auto" else switch == "on" and call.wanted
+        on = call.wanted and (call.matters if switch == "auto" else switch == "on")
         why = call.why if switch == "auto" or not call.wanted else f'switched "{switch}" by the scene'
         decided[name] = Effect(name=name, on=on, why=why)
     if faults:

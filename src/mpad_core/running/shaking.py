@@ -1,0 +1,109 @@
+r"""Thermal motion of one group of cells over a sub-step: random loads and Fixman's midpoint, compiled.
+
+Overdamped Langevin motion under the mobility M(x), dX = M F dt + kT ∇·M dt + (2kT)^½ M^½ dW, is had at the level of
+resistance: with R = M⁻¹ = L Lᵀ at the sub-step's start x and w the increments of independent Brownian paths over dt,
+
+    f_B = (2kT)^½ L w/dt,    U* = M(x) f_B,    ΔX = M(x + U* dt/2) (F + f_B) dt
+
+(Fixman, J. Chem. Phys. 69 (1978) 1527; Banchio and Brady, J. Chem. Phys. 118 (2003) 10323). The random load has no
+mean, and ⟨f_B f_Bᵀ⟩ = 2kT R/dt, so in the mean of the random part, to first order in dt and with ∂_k M at x,
+
+    ⟨ΔX_i⟩ = ½ dt² ∂_k M_ij M_kl ⟨f_l f_j⟩ = kT dt ∂_k M_ij M_kl R_lj = kT dt ∂_j M_ij:
+
+the drift kT ∇·M without a formula for it. M = (r(h) + C)⁻¹ changes within a burst through the heights alone, hence only
+heights are moved to the midpoint; what the frozen C leaves out of ∇·M is a load that the coupling brings along (see
+`mpad_core.physics.fluctuations`).
+
+Paths are functions of (key, cell, component, sub-step): a sub-step that is split because it was too long goes on along
+the same paths by dyadic Brownian bridges (Lévy's construction), since drawing anew would favour what makes short steps.
+"""
+
+import math
+
+import numpy as np
+
+from mpad_core.arrays import Array
+from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.streams import Stream, Word, mixed, normal_pair
+from mpad_core.running.layout import System
+from mpad_core.running.resisting import is_positive_definite, resistance
+
+TICKS = 1 << 16  # a sub-step is never split finer
+GAP_SHARE = 0.2  # of the gap to the wall that one sub-step may cross
+_THERMAL = int(Stream.THERMAL)
+
+
+@compiled
+def path(key: Word, owner: Word, pair: int, step: int, tick: int) -> tuple[float, float]:
+    """Give two Brownian paths of variance t at t = tick/TICKS of sub-step `step`; pairs 0 to 2 are a cell's six."""
+    if tick == 0:
+        return 0.0, 0.0
+    low, high, node = 0, TICKS, 1
+    x_low, y_low = 0.0, 0.0
+    x_high, y_high = normal_pair(key, _THERMAL, mixed(owner, pair), step)
+    while tick < high:
+        middle = (low + high) // 2
+        deviation = math.sqrt((high - low) / (4 * TICKS))
+        x, y = normal_pair(key, _THERMAL, mixed(owner, 4 * node + pair), step)
+        x = 0.5 * (x_low + x_high) + deviation * x
+        y = 0.5 * (y_low + y_high) + deviation * y
+        if tick <= middle:
+            high, x_high, y_high, node = middle, x, y, 2 * node
+        else:
+            low, x_low, y_low, node = middle, x, y, 2 * node + 1
+    return x_high, y_high
+
+
+@compiled
+def draw(group: int, system: System, key: Word, step: int, first: int, last: int, dt: float, noise: Array) -> None:
+    """Write the increments (6n,) of a group's paths from tick to tick of a sub-step of dt, in s^½; none into none."""
+    start = system.groups.first[group]
+    for k in range(noise.shape[0] // 2):
+        owner = system.molecules.owner[system.groups.cells[start + k // 3]]
+        x_from, y_from = path(key, owner, k % 3, step, first)
+        x_to, y_to = path(key, owner, k % 3, step, last)
+        noise[2 * k] = math.sqrt(dt) * (x_to - x_from)
+        noise[2 * k + 1] = math.sqrt(dt) * (y_to - y_from)
+
+
+@compiled
+def shake(
+    group: int, dt: float, energy: float, noise: Array, system: System, gaps: Array, matrix: Array, right: Array
+) -> bool:
+    """Take a group's resistance to the midpoint and add the random load; tell whether dt is short enough for that.
+
+    Parameters
+    ----------
+    energy
+        kT, pN µm.
+    noise : (6n,)
+        From `draw`, over dt.
+    gaps : (N,)
+        Of all cells to the wall, at the start.
+    matrix, right : (6n, 6n), (6n,)
+        What `resistance` wrote at the start; overwritten.
+    """
+    m = noise.shape[0]
+    if not is_positive_definite(matrix):
+        return False
+    strength = math.sqrt(2 * energy) / dt
+    push, star = np.zeros(m), np.zeros(m)
+    for i in range(m):
+        for j in range(i + 1):
+            push[i] += strength * matrix[i, j] * noise[j]
+    for i in range(m - 1, -1, -1):  # U* = L⁻ᵀ w (2kT)^½/dt
+        star[i] = strength * noise[i]
+        for j in range(i + 1, m):
+            star[i] -= matrix[j, i] * star[j]
+        star[i] /= matrix[i, i]
+    middle = gaps.copy()
+    for place in range(m // 6):
+        cell = system.groups.cells[system.groups.first[group] + place]
+        change = 0.5 * dt * star[6 * place + 2]
+        if not abs(change) <= GAP_SHARE * (gaps[cell] + system.bodies.wall_offset):
+            return False
+        middle[cell] += change
+    resistance(group, system, middle, matrix, right)
+    for i in range(m):
+        right[i] += push[i]
+    return True
