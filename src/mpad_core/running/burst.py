@@ -12,7 +12,7 @@ from mpad_core.running.layout import Attached, Bonds, Dice, Limits, Motion, Syst
 from mpad_core.running.moving import DONE, TOO_LONG, advance, attach, refresh_turns
 from mpad_core.running.reacting import break_bonds, form_bonds, list_candidates
 from mpad_core.running.resisting import is_positive_definite, resistance
-from mpad_core.running.shaking import TICKS, draw
+from mpad_core.running.shaking import TICKS, draw, longest_part
 
 REACHED, ROOM_NEEDED, NOT_POSITIVE, NO_BALANCE = 0, 1, 2, 3  # why a burst ended
 _LISTING_MARGIN = 0.03  # µm: molecules this far out of reach are listed too, and the list stands until they could reach
@@ -82,7 +82,7 @@ def _move_group(
     size = 6 * (system.groups.first[group + 1] - system.groups.first[group])
     noise = np.empty(system.thermal.energy.shape[0] * size)
     while left > 0:
-        part = min(part, left)
+        part = min(part, left, longest_part(group, dt, system, motion.gap))
         draw(group, system, key, step, TICKS - left, TICKS - left + part, dt, noise)
         outcome = advance(group, dt * part / TICKS, system, bonds, attached, motion, noise)
         if outcome == DONE:

@@ -19,12 +19,12 @@ from mpad_core.numerics.tables import Tables, value_and_slope
 from mpad_core.running.layout import Attached, Bonds, Molecules, Motion, Species, System
 from mpad_core.running.reacting import TENSION
 from mpad_core.running.resisting import resistance, solve_in_place
-from mpad_core.running.shaking import GAP_SHARE, shake
+from mpad_core.running.shaking import GAP_SHARE, SHAKEN_SHARE, shake
 
 DONE, TOO_LONG = 0, 1
 _MOST_ITERATIONS = 25
 _CLOSE = 1e-8  # µm: Newton has converged when its step moves no surface by more
-_LARGEST_TURN = 0.1  # rad in one sub-step
+LARGEST_TURN = 0.1  # rad in one sub-step
 
 
 @compiled
@@ -226,7 +226,9 @@ def advance(
     matrix = np.empty((6 * n, 6 * n))
     right, load, velocity = np.empty(6 * n), np.empty(6 * n), np.empty(6 * n)
     resistance(group, system, motion.gap, matrix, right)
+    share = GAP_SHARE
     for k in range(system.thermal.energy.shape[0]):
+        share = SHAKEN_SHARE
         if not shake(group, dt, system.thermal.energy[k], noise, system, motion.gap, matrix, right):
             return TOO_LONG
     for place in range(n):
@@ -235,9 +237,9 @@ def advance(
         return TOO_LONG
     for place in range(n):
         gap = motion.gap[groups.cells[start + place]]
-        if -velocity[6 * place + 2] * dt > GAP_SHARE * (gap + system.bodies.wall_offset):
+        if -velocity[6 * place + 2] * dt > share * (gap + system.bodies.wall_offset):
             return TOO_LONG
-        if math.sqrt(np.sum(velocity[6 * place + 3 : 6 * place + 6] ** 2)) * dt > _LARGEST_TURN:
+        if math.sqrt(np.sum(velocity[6 * place + 3 : 6 * place + 6] ** 2)) * dt > LARGEST_TURN:
             return TOO_LONG
     for place in range(n):
         cell = groups.cells[start + place]

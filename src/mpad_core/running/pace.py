@@ -11,12 +11,14 @@ from mpad_core.physics.coupling import contact_reach
 from mpad_core.physics.problem import Problem
 from mpad_core.running.assembly import Fixed, pair_gaps
 from mpad_core.running.layout import Limits
+from mpad_core.running.moving import LARGEST_TURN
 from mpad_core.running.reacting import OFF_RATE, ON_RATE
+from mpad_core.running.shaking import RMS_SHARE
 
 _MOST_SUB_STEPS = 1000  # in one burst, so that a run can be told to stop
 _GAP_CHANGE = 0.2  # of a cell's gap to the wall over which the frozen coupling may be combined with r(h)
 _LARGEST_SUB_STEP = 1e-3  # s, where nothing else bounds it
-_THERMAL_SHARE = 0.2  # of gaps and of the repulsion's range that thermal motion may cross in a sub-step
+_RANGE_SHARE = 0.2  # of the repulsion's range that thermal motion may cross in a sub-step
 _VERTICAL = 0.01  # vertical velocities are this fraction of the flow's past a cell, or less
 
 
@@ -55,26 +57,27 @@ def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
 def _thermal_steps(problem: Problem) -> list[float]:
     """Give the sub-steps (s) in which thermal motion crosses a small part of what it may not jump over; none without.
 
-    A cell's rms displacement (2 kT M Δt)^½ across a gap g is to be at most `_THERMAL_SHARE` of g and of the length ℓ
-    over which repulsion takes up kT. In a repulsion of stiffness kT/ℓ², backward Euler makes the variance too small by
-    the share kT M Δt/(2ℓ²): `_THERMAL_SHARE`²/4 or less, 1 %. M is g/(6πηa²) near a wall, four times that between two
-    cells, and at most Stokes'. A gap that becomes narrower than where it was bounded here splits the sub-step.
+    A cell's rms displacement (2 kT M Δt)^½ across a gap g is to be at most `RMS_SHARE` of g (a gap that is narrower
+    later splits the sub-step) and `_RANGE_SHARE` of the length ℓ over which repulsion takes up kT. In a repulsion of
+    stiffness kT/ℓ², backward Euler makes the variance too small by the share kT M Δt/(2ℓ²), that is `_RANGE_SHARE`²/4
+    or 1 %. M is g/(6πηa²) near a wall, four times that between two cells, and at most Stokes'. And the rms turn is to
+    be a fifth of the largest turn of a sub-step.
     """
     kT, radius = problem.thermal_energy, float(problem.radii.min())
     if kT == 0:
         return []
     stokes = 1 / (6 * np.pi * problem.setting.viscosity * radius)
     length, tips = _repelling(problem)
-    steps = []
+    steps = [(LARGEST_TURN / 5) ** 2 * radius**2 / (1.5 * kT * stokes)]
     if problem.setting.wall:
         lowest = float((problem.start[:, 2] - problem.radii).min())
         gap = float(problem.roughness.min()) + problem.wall_roughness + tips if tips > 0 else lowest
         mobility = stokes * min(gap / radius, 1.0)
-        steps.append((_THERMAL_SHARE * min(length, gap)) ** 2 / (2 * kT * mobility))
+        steps.append(min(_RANGE_SHARE * length, RMS_SHARE * gap) ** 2 / (2 * kT * mobility))
     if len(problem.radii) > 1 and tips > 0:
         gap = 2 * float(problem.roughness.min()) + tips
         mobility = stokes * (min(4 * gap / radius, 2.0) if problem.coupled else 2.0)
-        steps.append((_THERMAL_SHARE * min(length, gap)) ** 2 / (2 * kT * mobility))
+        steps.append(min(_RANGE_SHARE * length, RMS_SHARE * gap) ** 2 / (2 * kT * mobility))
     return steps
 
 

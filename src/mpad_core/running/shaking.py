@@ -16,6 +16,9 @@ heights are moved to the midpoint; what the frozen C leaves out of ∇·M is a l
 
 Paths are functions of (key, cell, component, sub-step): a sub-step that is split because it was too long goes on along
 the same paths by dyadic Brownian bridges (Lévy's construction), since drawing anew would favour what makes short steps.
+That is not enough: the drift stands in the squares of the increments, so splitting whatever came out large would lose
+part of it. Parts are therefore chosen from the gaps at their start (`longest_part`), with which the noise has nothing
+to do, and short enough that what comes out too large is a matter of five standard deviations.
 """
 
 import math
@@ -30,6 +33,8 @@ from mpad_core.running.resisting import is_positive_definite, resistance
 
 TICKS = 1 << 16  # a sub-step is never split finer
 GAP_SHARE = 0.2  # of the gap to the wall that one sub-step may cross
+SHAKEN_SHARE = 0.5  # the same where there is thermal motion
+RMS_SHARE = 0.1  # of the gap that thermal motion crosses in one part, root mean square
 _THERMAL = int(Stream.THERMAL)
 
 
@@ -67,6 +72,25 @@ def draw(group: int, system: System, key: Word, step: int, first: int, last: int
 
 
 @compiled
+def longest_part(group: int, dt: float, system: System, gaps: Array) -> int:
+    """Give over how many ticks of a sub-step of dt heat may move a group at gaps (N,); all where there is no heat.
+
+    A lone cell's mobility across the gap g is at most min(g/a, 1)/(6πηa).
+    """
+    ticks = TICKS
+    bodies = system.bodies
+    for k in range(system.thermal.energy.shape[0]):
+        for i in range(system.groups.first[group], system.groups.first[group + 1]):
+            cell = system.groups.cells[i]
+            radius, gap = bodies.radius[cell], gaps[cell] + bodies.wall_offset
+            mobility = min(gap / radius, 1.0) / (6 * math.pi * bodies.viscosity * radius)
+            square = 2 * system.thermal.energy[k] * mobility * dt / TICKS
+            while ticks > 1 and square * ticks > (RMS_SHARE * gap) ** 2:
+                ticks //= 2
+    return ticks
+
+
+@compiled
 def shake(
     group: int, dt: float, energy: float, noise: Array, system: System, gaps: Array, matrix: Array, right: Array
 ) -> bool:
@@ -100,7 +124,7 @@ def shake(
     for place in range(m // 6):
         cell = system.groups.cells[system.groups.first[group] + place]
         change = 0.5 * dt * star[6 * place + 2]
-        if not abs(change) <= GAP_SHARE * (gaps[cell] + system.bodies.wall_offset):
+        if not abs(change) <= SHAKEN_SHARE * (gaps[cell] + system.bodies.wall_offset):
             return False
         middle[cell] += change
     resistance(group, system, middle, matrix, right)
