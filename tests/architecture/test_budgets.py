@@ -110,6 +110,7 @@ def test_importing_the_package_costs_nothing():
     ("isolated", {"mpad_rpb", "mpad_core.numerics.stokeslets", "mpad_core.numerics.krylov"}),
     ("no wall", {"mpad_core.physics.reactions", "mpad_bell", "mpad_surfaces", "mpad_isolated"}),
     ("all", {"mpad_isolated", "MDAnalysis", "distributed", "mpad_core.testing", "hypothesis", "pytest"}),
+    ("all", {"mpad_core.physics.fluctuations", "mpad_core.numerics.fluctuations", "mpad_rpb.fluctuating"}),
 ])  # fmt: skip
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_what_a_scene_leaves_out_is_not_imported(command, name, absent, scene, tmp_path):

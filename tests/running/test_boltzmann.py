@@ -85,7 +85,7 @@ def deviations(lab: Any, time: float, slower: float) -> dict[str, tuple[float, f
 
 def test_heights_are_boltzmanns(lab: Any) -> None:
     """The mean, the mean square and the quartiles of the gap; a scheme without its drift would be seen at once."""
-    for name, (found, wrong) in deviations(lab, time=1500.0, slower=1.0).items():
+    for name, (found, wrong) in deviations(lab, time=3000.0, slower=1.0).items():
         assert abs(found) < FIVE_SIGMA, (name, found, wrong)
         if name == "mean":
             assert abs(wrong) > 2 * FIVE_SIGMA
@@ -93,8 +93,8 @@ def test_heights_are_boltzmanns(lab: Any) -> None:
 
 @pytest.mark.long
 def test_heights_are_boltzmanns_over_a_long_time(lab: Any) -> None:
-    """With sub-steps four times as short, over a time in which errors of one part in a hundred would be seen."""
-    for name, (found, _) in deviations(lab, time=30_000.0, slower=0.25).items():
+    """With sub-steps half as long, over a time in which errors of one part in a hundred would be seen."""
+    for name, (found, _) in deviations(lab, time=60_000.0, slower=0.5).items():
         assert abs(found) < FIVE_SIGMA, (name, found)
 
 
