@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from mpad_core.numerics.streams import Stream, fill_uniform, key_of, mixed, philox, uniform, uniform_pair
+from mpad_core.numerics.streams import Stream, fill_uniform, key_of, mixed, normal_pair, philox, uniform, uniform_pair
 
 KEY = key_of(7)
 KNOWN = [  # kat_vectors of Random123 (Salmon, Moraes, Dror & Shaw 2011), philox4x32-10: counter, key, answer
@@ -146,3 +146,14 @@ def test_keys_of_seeds_and_replicates_differ() -> None:
 
 def test_a_large_seed_is_not_a_small_one_with_a_replicate() -> None:
     assert key_of(5, 1) != key_of(5 + (1 << 32), 0)
+
+
+def test_normal_pairs_are_normal_and_independent() -> None:
+    pairs = np.array([normal_pair(KEY, 200, np.uint64(9), step) for step in range(40_000)])
+    for part in pairs.T:
+        assert stats.kstest(part, "norm").pvalue > 1e-4
+    assert abs((pairs[:, 0] * pairs[:, 1]).mean()) < 3.9 / np.sqrt(len(pairs))
+    radius = (pairs**2).sum(axis=1)
+    assert stats.kstest(radius, "expon", args=(0, 2)).pvalue > 1e-4
+    assert abs(np.corrcoef(pairs[:-1, 0], pairs[1:, 0])[0, 1]) < 3.9 / np.sqrt(len(pairs))
+    assert normal_pair(KEY, 200, np.uint64(9), 5) == tuple(pairs[5])

@@ -16,6 +16,7 @@ OFTEN = ("--checkpoint-every", "0.2")
 FEW = ['stop.time="400 ms"', "stop.when=[]", 'cells.roller.start.rolling_alone="20 ms"']
 VARIANTS = {
     "isolated": [*FEW[1:], 'stop.time="120 ms"', 'solver="isolated"'],
+    "thermal": [*FEW[1:], 'stop.time="120 ms"', 'effects.thermal="on"'],
     "pairs": [*FEW[1:], 'stop.time="120 ms"', 'bonds.tether.reach="pairs"'],
 }
 
