@@ -45,12 +45,12 @@ height = "6 um"
 """
 STRUCK = {  # what each bare burst does without: calls, loops over what is absent, and conditions
     "everything": ("break_bonds", "form_bonds", "attach", "_list_is_short", "attached.first", "contacts.pair_first",
-                   "contacts.reach", "thermal.energy", "draw"),
+                   "contacts.reach", "thermal.energy"),
     "reactions": ("break_bonds", "form_bonds", "_list_is_short"),
     "sorting of bonds": ("attach",),
     "loads of bonds": ("attached.first",),
     "contacts": ("contacts.pair_first", "contacts.reach"),
-    "thermal motion": ("thermal.energy", "draw"),
+    "thermal motion": ("thermal.energy",),
 }  # fmt: skip
 
 

@@ -74,16 +74,16 @@ def _list_is_short(motion: Motion, listing: _Listing) -> bool:
 @compiled
 def _move_group(
     group: int, step: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, turns: Array,
-    key: Word,
+    key: Word, noise: Array,
 ) -> int:  # fmt: skip
     """Move a group over sub-step `step`, in as many parts as it takes."""
     left = TICKS
     part = TICKS
-    size = 6 * (system.groups.first[group + 1] - system.groups.first[group])
-    noise = np.empty(system.thermal.energy.shape[0] * size)
     while left > 0:
-        part = min(part, left, longest_part(group, dt, system, motion.gap))
-        draw(group, system, key, step, TICKS - left, TICKS - left + part, dt, noise)
+        part = min(part, left)
+        for k in range(system.thermal.energy.shape[0]):
+            part = min(part, longest_part(group, dt, system.thermal.energy[k], system, motion.gap))
+            draw(group, system, key, step, TICKS - left, TICKS - left + part, dt, noise)
         outcome = advance(group, dt * part / TICKS, system, bonds, attached, motion, noise)
         if outcome == DONE:
             left -= part
@@ -153,6 +153,7 @@ def burst(
     )  # fmt: skip
     room = bonds.cell.shape[0]
     attached = Attached(np.zeros(cells + 1, np.int64), np.zeros(room, np.int64), np.empty((room, 3)))
+    noise = np.empty(system.thermal.energy.shape[0] * 6 * system.groups.cells.shape[0])
     groups = system.groups.first.shape[0] - 1
     dt = limits.sub_step
     for done in range(limits.most):
@@ -173,7 +174,7 @@ def burst(
             )
             attach(bonds, system.molecules, turns, attached)
         for group in range(groups):
-            outcome = _move_group(group, step, dt, system, bonds, attached, motion, turns, dice.key)
+            outcome = _move_group(group, step, dt, system, bonds, attached, motion, turns, dice.key, noise)
             if outcome != REACHED:
                 return outcome, done, group
         if _must_end(motion, limits):

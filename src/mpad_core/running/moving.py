@@ -219,7 +219,7 @@ def advance(
 ) -> int:
     """Move a group over dt; give DONE, or what stopped it, in which case nothing has changed.
 
-    `noise` (6n,) are the increments (s^½) of the Brownian paths over dt, empty where there is no thermal motion.
+    `noise` (6n,) are the increments (s^½) of the Brownian paths over dt; not read where there is no thermal motion.
     """
     groups = system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]

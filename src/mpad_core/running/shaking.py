@@ -61,9 +61,9 @@ def path(key: Word, owner: Word, pair: int, step: int, tick: int) -> tuple[float
 
 @compiled
 def draw(group: int, system: System, key: Word, step: int, first: int, last: int, dt: float, noise: Array) -> None:
-    """Write the increments (6n,) of a group's paths from tick to tick of a sub-step of dt, in s^½; none into none."""
-    start = system.groups.first[group]
-    for k in range(noise.shape[0] // 2):
+    """Write the increments (s^½) of a group's paths from tick to tick of a sub-step of dt into the first 6n places."""
+    start, end = system.groups.first[group], system.groups.first[group + 1]
+    for k in range(3 * (end - start)):
         owner = system.molecules.owner[system.groups.cells[start + k // 3]]
         x_from, y_from = path(key, owner, k % 3, step, first)
         x_to, y_to = path(key, owner, k % 3, step, last)
@@ -72,21 +72,20 @@ def draw(group: int, system: System, key: Word, step: int, first: int, last: int
 
 
 @compiled
-def longest_part(group: int, dt: float, system: System, gaps: Array) -> int:
-    """Give over how many ticks of a sub-step of dt heat may move a group at gaps (N,); all where there is no heat.
+def longest_part(group: int, dt: float, energy: float, system: System, gaps: Array) -> int:
+    """Give over how many ticks of a sub-step of dt heat, kT = `energy`, may move a group at gaps (N,).
 
     A lone cell's mobility across the gap g is at most min(g/a, 1)/(6πηa).
     """
     ticks = TICKS
     bodies = system.bodies
-    for k in range(system.thermal.energy.shape[0]):
-        for i in range(system.groups.first[group], system.groups.first[group + 1]):
-            cell = system.groups.cells[i]
-            radius, gap = bodies.radius[cell], gaps[cell] + bodies.wall_offset
-            mobility = min(gap / radius, 1.0) / (6 * math.pi * bodies.viscosity * radius)
-            square = 2 * system.thermal.energy[k] * mobility * dt / TICKS
-            while ticks > 1 and square * ticks > (RMS_SHARE * gap) ** 2:
-                ticks //= 2
+    for i in range(system.groups.first[group], system.groups.first[group + 1]):
+        cell = system.groups.cells[i]
+        radius, gap = bodies.radius[cell], gaps[cell] + bodies.wall_offset
+        mobility = min(gap / radius, 1.0) / (6 * math.pi * bodies.viscosity * radius)
+        square = 2 * energy * mobility * dt / TICKS
+        while ticks > 1 and square * ticks > (RMS_SHARE * gap) ** 2:
+            ticks //= 2
     return ticks
 
 
@@ -100,14 +99,14 @@ def shake(
     ----------
     energy
         kT, pN µm.
-    noise : (6n,)
+    noise : (6n,) or more
         From `draw`, over dt.
     gaps : (N,)
         Of all cells to the wall, at the start.
     matrix, right : (6n, 6n), (6n,)
         What `resistance` wrote at the start; overwritten.
     """
-    m = noise.shape[0]
+    m = matrix.shape[0]
     if not is_positive_definite(matrix):
         return False
     strength = math.sqrt(2 * energy) / dt
