@@ -1,0 +1,49 @@
+"""Mobilities of `sd` are symmetric and positive definite, whatever the spheres; columns are the matrix's."""
+
+import numpy as np
+import pytest
+from spheres import grown, stokes_units
+
+from mpad_core import mobility_matrix
+from mpad_core.interfaces.values import Configuration, Setting
+from mpad_sd import StokesianDynamics
+
+SD = StokesianDynamics()
+QUIET = Setting(viscosity=1.0)
+
+
+def anything(seed):
+    """Give one to eight spheres of ratios to 10:1 at gaps of 1e-6 to 2, and whether there is a wall."""
+    rng = np.random.default_rng(seed)
+    count, wall = int(rng.integers(1, 9)), bool(rng.random() < 0.7)
+    return *grown(rng, count, float(rng.choice([1.0, 3.0, 10.0])), 1e-6, 2.0, wall), wall
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(SOME), pytest.param(range(SOME, 1000), marks=pytest.mark.long)], ids=["some", "a thousand"]
+)
+def test_mobility_is_symmetric_and_positive(seeds):
+    lowest = np.inf
+    for seed in seeds:
+        centres, radii, wall = anything(seed)
+        found = mobility_matrix(SD, centres, radii, viscosity=1.0, wall=wall)
+        assert (found == found.T).all(), seed
+        np.linalg.cholesky(found)
+        scales = stokes_units(radii)
+        lowest = min(lowest, np.linalg.eigvalsh(found / np.outer(scales, scales))[0])
+        assert lowest > 0, seed
+    print(f"smallest eigenvalue in Stokes' units: {lowest:.2e}")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_single_columns_are_those_of_the_matrix(seed):
+    """Columns are solved one by one, and not made symmetric: a reciprocal answer is due to the equations."""
+    centres, radii, wall = anything(seed)
+    tight = StokesianDynamics(tolerance=1e-10)
+    prepared = tight.prepare(tight.plan(Setting(viscosity=1.0, wall=wall)), Configuration(centres=centres, radii=radii))
+    size = 6 * len(radii)
+    unit, scales = np.eye(size).reshape(-1, 6, size), stokes_units(radii)
+    matrix = tight.solve(prepared, unit).velocity.reshape(size, size) / np.outer(scales, scales)
+    for k in range(0, size, 5):
+        column = tight.solve(prepared, unit[:, :, k]).velocity.ravel() / (scales * scales[k])
+        assert column == pytest.approx(matrix[:, k], abs=1e-8)
