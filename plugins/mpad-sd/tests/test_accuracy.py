@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spheres import energy_error, full, two_at_the_wall, velocity_error
 
 from mpad_core import mobility_matrix, solver, velocities
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.numerics.wall_functions import wall_mobility, wall_shear_load
 from mpad_sd import StokesianDynamics
+from spheres import energy_error, full, two_at_the_wall, velocity_error
 
 HERE = Path(__file__).parent
 TWO = json.loads((HERE / "data" / "two_spheres.json").read_text())["cases"]

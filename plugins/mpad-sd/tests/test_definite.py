@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from spheres import grown, stokes_units
 
 from mpad_core import mobility_matrix
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_sd import StokesianDynamics
+from spheres import grown, stokes_units
 
 SD = StokesianDynamics()
 QUIET = Setting(viscosity=1.0)
@@ -20,17 +20,19 @@ def anything(seed):
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(SOME), pytest.param(range(SOME, 1000), marks=pytest.mark.long)], ids=["some", "a thousand"]
+    "seeds",
+    [range(24), pytest.param(range(24, 1000), marks=[pytest.mark.long, pytest.mark.timeout(1800)])],
+    ids=["some", "a thousand"],
 )
 def test_mobility_is_symmetric_and_positive(seeds):
     lowest = np.inf
     for seed in seeds:
         centres, radii, wall = anything(seed)
         found = mobility_matrix(SD, centres, radii, viscosity=1.0, wall=wall)
-        assert (found == found.T).all(), seed
+        units = np.outer(stokes_units(radii), stokes_units(radii))
+        assert np.abs((found - found.T) / units).max() < 1e-14, seed
         np.linalg.cholesky(found)
-        scales = stokes_units(radii)
-        lowest = min(lowest, np.linalg.eigvalsh(found / np.outer(scales, scales))[0])
+        lowest = min(lowest, np.linalg.eigvalsh(found / units)[0])
         assert lowest > 0, seed
     print(f"smallest eigenvalue in Stokes' units: {lowest:.2e}")
 
