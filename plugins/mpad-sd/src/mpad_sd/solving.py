@@ -109,11 +109,29 @@ class Prepared:
         tolerance, units = min(self.plan.tolerance, MATRIX), self.level.units
         unit = np.eye(units.size).reshape(units.size, *units.shape)
         found = self._solved(np.zeros_like(self.level.ambient), unit, tolerance)
-        mobility = (found.velocity * units).reshape(units.size, units.size)
+        mobility = self._symmetric((found.velocity * units).reshape(units.size, units.size))
         free = self._solved(self.level.ambient, self.level.load[None], tolerance)
-        moved = columns.reshape(len(columns), -1) @ (0.5 * (mobility + mobility.T))
+        moved = columns.reshape(len(columns), -1) @ mobility
         report = evolve(found.report, error=max(found.report.error, free.report.error))
         return Solved(velocity=moved.reshape(columns.shape) / units + free.velocity, report=report, sources=None)
+
+    def _symmetric(self, mobility: Array) -> Array:
+        """Give the symmetric part, in the units of `layout`.
+
+        Raises
+        ------
+        RefusedError
+            If it is not positive definite, as it may be where what a short reach leaves out outweighs a tight contact.
+        """
+        scene, symmetric = self.level.scene, 0.5 * (mobility + mobility.T)
+        where = closest(Configuration(centres=scene.centres, radii=scene.radii, wall_gaps=scene.gaps))
+        with refused("sd", where):
+            try:
+                np.linalg.cholesky(symmetric)
+            except np.linalg.LinAlgError as error:
+                fault = f"the mobility is not positive definite with reach {self.plan.reach:g}; choose a larger one"
+                raise FloatingPointError(fault) from error
+        return symmetric
 
     def root(self, noise: Array) -> Array:
         """Multiply noise (N, 6) or (N, 6, k) with a root of the mobility."""
