@@ -4,7 +4,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.errors import refused
+from mpad_core.interfaces.errors import RefusedError, refused
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.harmonics.degrees import Degrees
 from mpad_core.numerics.harmonics.far import far_of
@@ -125,12 +125,11 @@ class Prepared:
         """
         scene, symmetric = self.level.scene, 0.5 * (mobility + mobility.T)
         where = closest(Configuration(centres=scene.centres, radii=scene.radii, wall_gaps=scene.gaps))
-        with refused("sd", where):
-            try:
-                np.linalg.cholesky(symmetric)
-            except np.linalg.LinAlgError as error:
-                fault = f"the mobility is not positive definite with reach {self.plan.reach:g}; choose a larger one"
-                raise FloatingPointError(fault) from error
+        try:
+            np.linalg.cholesky(symmetric)
+        except np.linalg.LinAlgError as error:
+            fault = f"the mobility is not positive definite with reach {self.plan.reach:g}; choose a larger one"
+            raise RefusedError(f"sd: {fault}; {where}") from error
         return symmetric
 
     def root(self, noise: Array) -> Array:
