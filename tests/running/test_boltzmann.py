@@ -96,7 +96,7 @@ def test_heights_are_boltzmanns(lab: Any) -> None:
 
 @pytest.mark.long
 def test_heights_are_boltzmanns_over_a_long_time(lab: Any) -> None:
-    """With sub-steps half as long, over a time in which errors of one part in a hundred would be seen."""
+    """With sub-steps half as long, over a time in which two parts in a hundred of the mean would be seen."""
     for name, (found, _) in deviations(lab, time=60_000.0, slower=0.5).items():
         assert abs(found) < FIVE_SIGMA, (name, found)
 

@@ -60,8 +60,9 @@ def _thermal_steps(problem: Problem) -> list[float]:
     A cell's rms displacement (2 kT M Δt)^½ across a gap g is to be at most `RMS_SHARE` of g (a gap that is narrower
     later splits the sub-step) and `_RANGE_SHARE` of the length ℓ over which repulsion takes up kT. In a repulsion of
     stiffness kT/ℓ², backward Euler makes the variance too small by the share kT M Δt/(2ℓ²), that is `_RANGE_SHARE`²/4
-    or 1 %. M is g/(6πηa²) near a wall, four times that between two cells, and at most Stokes'. And the rms turn is to
-    be a fifth of the largest turn of a sub-step.
+    or 1 %. M is g/(6πηa²) near a wall, four times that between two cells, and at most Stokes' (a solver without
+    lubrication lets two touching cells move some twice as easily). And the rms turn is to be a fifth of the largest
+    turn of a sub-step.
     """
     kT, radius = problem.thermal_energy, float(problem.radii.min())
     if kT == 0:
