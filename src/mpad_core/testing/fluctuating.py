@@ -17,7 +17,6 @@ from mpad_core.testing.invariance import WALLS
 from mpad_core.testing.strategies import configurations, crowd, some_loads, tried
 
 _EXAMPLES = 5
-_MANY = 27  # spheres: enough that a solver which iterates for many does so
 _COLUMNS = 5
 _SHARE = 0.02  # of the room to move: the differences that drifts are compared with
 _DRIFT = 1e-4  # relative: what is left out by differences of fourth order, and digits lost by smaller ones
@@ -32,9 +31,12 @@ class FluctuatingContract(AskedSolver):
     ----------
     solver
         The solver; give it in the class that inherits.
+    many
+        Spheres, so many that a solver which treats many in another way does so.
     """
 
     solver: Any
+    many: int = 27
 
     def root(self, setting: Setting, at: Configuration, noise: Array) -> Array:
         """Ask for a root times noise."""
@@ -64,7 +66,7 @@ class FluctuatingContract(AskedSolver):
     @WALLS
     def test_root_of_many(self, wall: bool) -> None:
         """Bᵀ·M⁻¹·B is one, also where there are many spheres, which may be treated another way."""
-        setting, at = self.setting(wall), self.fitting(crowd(_MANY))
+        setting, at = self.setting(wall), self.fitting(crowd(self.many))
         noise = some_loads((len(at.radii), 6, _COLUMNS))
         made = self.root(setting, at, noise).reshape(-1, _COLUMNS)
         scales = self.scales(setting, at)
@@ -77,7 +79,7 @@ class FluctuatingContract(AskedSolver):
     @WALLS
     def test_root_is_linear(self, wall: bool) -> None:
         """One B for all noises, alone or in a block; the same bits when asked again."""
-        setting, at = self.setting(wall), self.fitting(crowd(_MANY))
+        setting, at = self.setting(wall), self.fitting(crowd(self.many))
         prepared = self.solver.prepare(self.solver.plan(setting), at)
         noise = some_loads((len(at.radii), 6, 2))
         made = self.solver.root(prepared, noise)
