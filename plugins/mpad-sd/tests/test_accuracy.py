@@ -86,8 +86,8 @@ def test_unbounded_near_pairs_are_exact(case):
     found = velocities(tight, centres, [a, b], viscosity=1.0, shear_rate=1.0, wall=False)
     matrix = mobility_matrix(tight, centres, [a, b], viscosity=1.0, wall=False)
     near = case["gap12"] < 1.5 * min(a, b)
-    assert velocity_error(found, case["V_shear"], np.array([a, b])) < (1e-9 if near else 1e-3)
-    assert energy_error(matrix, np.array(case["M"])) < (1e-9 if near else 1e-2)
+    assert velocity_error(found, case["V_shear"], np.array([a, b])) < (1e-11 if near else 1e-5)
+    assert energy_error(matrix, np.array(case["M"])) < (1e-10 if near else 3e-3)
 
 
 @pytest.mark.parametrize("case", INDEPENDENT, ids=by_id)
@@ -95,13 +95,16 @@ def test_two_to_four_spheres_against_fundamental_solutions(case):
     radii = np.array(case["a"])
     size = 6 * len(radii)
     found = errors(SD, case["x"], radii, case["V_shear"], full(case["M_upper"], size))
-    assert found[0] < 2e-2
-    assert found[1] < 5e-2
+    assert found[0] < 5e-3
+    assert found[1] < 2e-2
 
 
 @pytest.mark.parametrize("case", [case for case in TWO if case["id"].startswith("ratio 2")], ids=by_id)
 def test_strain_is_worth_a_digit_and_no_mobility(case):
-    """Strain is how spheres feel shear beyond its velocity and rotation: the mobility does not know of it."""
+    """Strain is how spheres feel shear beyond its velocity and rotation: the mobility does not know of it.
+
+    Of the two hundred cases of each ratio, it is worth a factor of 54 at least to 2:1, 34 to 5:1, 200 in the median.
+    """
     radii = np.array(case["a"])
     centres, mobility = case["x"], full(case["M_upper"], 12)
     having, lacking = (errors(chosen, centres, radii, case["V_shear"], mobility) for chosen in (SD, WITHOUT_STRAIN))

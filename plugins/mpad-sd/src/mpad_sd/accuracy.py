@@ -18,6 +18,12 @@ from mpad_core.numerics.harmonics.layout import place, places
 
 SHARE = 0.045
 
+FAR = 30.0
+"""What far spheres leave out falls as the square of the distance, in smaller radii, from which on they are far.
+
+Measured for eight to twelve spheres at gaps of 1e-3 to 1 and of 0.3 to 6, with reaches of 1.5, 4 and 8.
+"""
+
 LEAST = 1e-10
 """Of the exact functions, all that a lone sphere has."""
 
@@ -57,3 +63,10 @@ def error_of(system: System, ambient: Array, load: Array, y: Array, u: Array, lo
         for k in range(6):
             size += u[i, k] * u[i, k]
     return max(LEAST, SHARE * math.sqrt(missed / size)) if size > 0 else 0.0
+
+
+def missed_afar(system: System, reach: float) -> float:
+    """Give by how much the estimate grows where pairs with gaps above `reach` smaller radii have their moments only."""
+    count = len(system.at.degrees)
+    every = count * (count - 1) // 2
+    return 1.0 if len(system.pairs.rows) == every else 1 + FAR / (2 + reach) ** 2

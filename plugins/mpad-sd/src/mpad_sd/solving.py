@@ -13,7 +13,7 @@ from mpad_core.numerics.harmonics.levels import Flow, Level, Scene
 from mpad_core.numerics.harmonics.products import solved
 from mpad_core.numerics.harmonics.warm import kept, started
 from mpad_core.numerics.neighbours import closest_pair
-from mpad_sd.accuracy import error_of
+from mpad_sd.accuracy import error_of, missed_afar
 from mpad_sd.near import degrees_of
 from mpad_sd.refusing import refuse_bad, refuse_loads
 
