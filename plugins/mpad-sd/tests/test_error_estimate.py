@@ -72,7 +72,7 @@ MANY = [pytest.mark.long, pytest.mark.timeout(1800)]
 @pytest.mark.parametrize("count", [30, pytest.param(300, marks=MANY)], ids=["some", "many"])
 @pytest.mark.parametrize(
     ("kind", "reach"),
-    [(near_two, 8.0), (near_few, 8.0), (spread, 8.0), (spread, 4.0), (spread, 1.5)] + CROWDED,
+    [(near_two, 8.0), (near_few, 8.0), (spread, 8.0), (spread, 4.0), (spread, 1.5), *CROWDED],
 )
 def test_reported_error_covers_the_true_one(kind, reach, count):
     found = ratios(kind, solver("sd", reach=reach), range(count))
