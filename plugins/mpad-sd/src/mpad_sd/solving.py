@@ -171,5 +171,6 @@ class Prepared:
             iterations, residual = max(iterations, done), max(residual, left)
             each = zip(given, y, u * self.level.units, strict=True)
             error = max(error, *(error_of(system, ambient, *column, lonely) for column in each))
+        error *= missed_afar(system, self.plan.reach)
         report = Report(error=error + residual, iterations=iterations, residual=residual)
         return Solved(velocity=velocity, report=report, sources=y if len(loads) <= TOGETHER else None)
