@@ -8,6 +8,7 @@ from mpad_cdlbiem import CdlBiem
 from mpad_cdlbiem.spectral.fields import flow_at, stresslets, tractions
 from mpad_cdlbiem.spectral.quadrature import sphere_rule
 from mpad_core.interfaces.values import Configuration, Setting
+from mpad_core.numerics.harmonics.levels import Flow
 
 VISCOSITY = 1.3
 SHEAR = 0.7
@@ -35,7 +36,7 @@ class Solved:
 
     def disturbance(self, points):
         """Give the flow without the ambient one, which far away would leave no digits of the rest."""
-        still = evolve(self.level, scene=evolve(self.level.scene, shear_rate=0.0))
+        still = evolve(self.level, scene=evolve(self.level.scene, flow=Flow(0.0, 0.0)))
         return flow_at(still, self.sources, points)
 
     def of_body(self, sphere, points):

@@ -1,6 +1,6 @@
 """The errors that people see: one clear line, an exit code, never a traceback."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 
@@ -29,12 +29,12 @@ class RefusedError(MpadError):
 
 
 @contextmanager
-def refused(solver: str, where: str = "") -> Iterator[None]:
-    """Turn what arithmetic could not do into a solver's refusal; `where` follows after a semicolon."""
+def refused(solver: str, where: Callable[[], str] | None = None) -> Iterator[None]:
+    """Turn what arithmetic could not do into a solver's refusal; what `where` gives then follows after a semicolon."""
     try:
         yield
     except FloatingPointError as error:
-        raise RefusedError(f"{solver}: {error}" + (f"; {where}" if where else "")) from error
+        raise RefusedError(f"{solver}: {error}" + (f"; {where()}" if where else "")) from error
 
 
 class DiskFullError(MpadError):

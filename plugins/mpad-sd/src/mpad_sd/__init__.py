@@ -27,11 +27,10 @@ class StokesianDynamics:
         Residual at which the iteration stops; for a whole mobility matrix 1e-9 at most.
     reach
         In smaller radii: the gap up to which a pair counts as near. The drift from and to the wall is of the order of
-        the moments left out beyond. Where cells are crowded, 1.5 takes less time and memory, and keeps the speed along
-        the flow right to some per cent.
+        the moments left out beyond. Where cells are crowded, 4 takes less time and memory; with less, tight contacts
+        beside far neighbours may make the mobility indefinite, which is refused where a whole matrix is asked for.
     strain
-        Whether spheres feel and make rates of strain beyond their own wall; without, the error in shear shows what the
-        stresslets are worth.
+        Whether the ambient rate of strain acts on the spheres; without, the error in shear shows what it is worth.
     least_gap
         In smaller radii: lubrication between closer surfaces, touching ones included, is that of this gap.
     """

@@ -18,7 +18,7 @@ HIGHEST = 40
 """Of the larger of two spheres, whatever the ratio: blocks grow as its cube."""
 
 SPREAD = 11.5
-"""Harmonics count until they have fallen by exp(-SPREAD); with fewer, lone spheres near the wall feel strain less."""
+"""Harmonics count until they have fallen by exp(-SPREAD): to a thousandth of a per cent, since lifts are so small."""
 
 
 @compiled

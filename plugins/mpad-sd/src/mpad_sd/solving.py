@@ -39,7 +39,7 @@ class Plan:
         refuse_bad(configuration, self.setting)
         scene = self._scene(configuration)
         degrees = degrees_of(scene.centres, scene.radii, scene.gaps, scene.wall, self.reach)
-        with refused("sd", closest(configuration)):
+        with refused("sd", lambda: closest(configuration)):
             level = level_of(scene, degrees)
         return Prepared(plan=self, degrees=degrees, level=level, guess=guess)
 
@@ -124,10 +124,10 @@ class Prepared:
             If it is not positive definite, as it may be where what a short reach leaves out outweighs a tight contact.
         """
         scene, symmetric = self.level.scene, 0.5 * (mobility + mobility.T)
-        where = closest(Configuration(centres=scene.centres, radii=scene.radii, wall_gaps=scene.gaps))
         try:
             np.linalg.cholesky(symmetric)
         except np.linalg.LinAlgError as error:
+            where = closest(Configuration(centres=scene.centres, radii=scene.radii, wall_gaps=scene.gaps))
             fault = f"the mobility is not positive definite with reach {self.plan.reach:g}; choose a larger one"
             raise RefusedError(f"sd: {fault}; {where}") from error
         return symmetric

@@ -1,8 +1,9 @@
 """Pairs far apart: what forces, torques and stresslets do to velocities, spins and rates of strain; compiled.
 
-Of the vector harmonics these are W and X of degree 1 and W of degree 2, to which a pair's block is restricted: still a
-Galerkin projection, so the grand mobility stays definite. The closed forms of `stresslets` are summed over all pairs,
-many at once, and taken away again for those that are listed as near.
+Of the vector harmonics these are W and X of degree 1 and W of degree 2, to which a pair's block is restricted. Where
+all pairs are, that is a Galerkin projection; beside pairs with higher degrees it is none, and the grand mobility is
+definite only as long as what is cut is small beside the tightest contact. The closed forms of `stresslets` are summed
+over all pairs, many at once, and taken away again for those that are listed as near.
 """
 
 import math
