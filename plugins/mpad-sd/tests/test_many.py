@@ -10,7 +10,7 @@ import pytest
 
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.numerics.harmonics import factors
-from mpad_sd import StokesianDynamics
+from mpad_sd import StokesianDynamics, solving
 from spheres import grown, velocity_error
 
 SHEAR = Setting(viscosity=1.0, shear_rate=1.0)
@@ -77,6 +77,23 @@ def test_three_hundred_spheres_of_as_many_radii():
     print(f"300 radii: {taken[0]:.1f} s, again {taken[1]:.1f} s, {found.report}")
     assert np.isfinite(found.velocity).all()
     assert found.report.error < 0.2
+
+
+@pytest.mark.parametrize(("wall", "reach"), [(True, 8.0), (True, 2.0), (False, 2.0)])
+def test_the_whole_mobility_by_elimination_is_that_by_columns(monkeypatch, wall, reach):
+    """Loads and flow together, near pairs and far ones."""
+    centres, radii = grown(np.random.default_rng(5), 6, 2.0, 0.05, 3.0)
+    at, loads = Configuration(centres=centres, radii=radii), np.random.default_rng(6).normal(size=(6, 6, 40))
+    chosen = StokesianDynamics(tolerance=1e-12, reach=reach)
+    prepared = chosen.prepare(chosen.plan(Setting(viscosity=2.0, shear_rate=3.0, wall=wall)), at)
+    eliminated = chosen.solve(prepared, loads)
+    single = chosen.solve(prepared, loads[:, :, 7])
+    assert eliminated.velocity[:, :, 7] == pytest.approx(single.velocity, abs=1e-9)
+    assert eliminated.report.iterations == 0
+    monkeypatch.setattr(solving, "DENSE", 0)
+    by_columns = chosen.solve(prepared, loads)
+    assert by_columns.report.iterations > 0
+    assert by_columns.velocity == pytest.approx(eliminated.velocity, abs=1e-9)
 
 
 PEAK = """

@@ -24,7 +24,7 @@ class StokesianDynamics:
     Parameters
     ----------
     tolerance
-        Residual at which the iteration stops; for a whole mobility matrix 1e-9 at most.
+        Residual at which the iteration stops.
     reach
         In smaller radii: the gap up to which a pair counts as near. The drift from and to the wall is of the order of
         the moments left out beyond. Where cells are crowded, 4 takes less time and memory; with less, tight contacts

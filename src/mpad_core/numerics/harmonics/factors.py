@@ -41,7 +41,7 @@ def factored(blocks: Blocks) -> Factors:
     """
     size = 6 * len(blocks.diagonal)
     if size <= DENSE:
-        inverse = _dense(blocks)
+        inverse = summed(blocks)
         none, empty = np.zeros(0, np.int64), np.zeros(0)
         if not invert(inverse):
             raise FloatingPointError("the resistance is not positive definite")
@@ -50,8 +50,8 @@ def factored(blocks: Blocks) -> Factors:
 
 
 @compiled_sums
-def _dense(blocks: Blocks) -> Array:
-    """Give the sum of the blocks."""
+def summed(blocks: Blocks) -> Array:
+    """Give the sum of the blocks, (6N, 6N)."""
     count = len(blocks.diagonal)
     out = np.zeros((6 * count, 6 * count))
     for i in range(count):

@@ -131,6 +131,7 @@ class Level:
 
     scene: Scene
     system: System
+    blocks: Blocks  # of the resistance of lone spheres and near pairs, with every correction
     ambient: Array  # (n,)
     load: Array  # (N, 6)
     units: Array  # (N, 6)
@@ -166,9 +167,10 @@ class Level:
         )
         chosen = np.flatnonzero(degrees.near) if lubrication else np.zeros(0, np.intp)
         missing = _missing(scene, pairs, chosen, units, load)
-        coupled = factored(Blocks(alone, degrees.who[chosen], missing))
-        system = System(at, pairs, no_far() if far is None else far, scene.wall, operators, inverses, coupled)
-        return cls(scene=scene, system=system, ambient=ambient, load=load, units=units)
+        blocks = Blocks(alone, degrees.who[chosen], missing)
+        beyond = no_far() if far is None else far
+        system = System(at, pairs, beyond, scene.wall, operators, inverses, factored(blocks))
+        return cls(scene=scene, system=system, blocks=blocks, ambient=ambient, load=load, units=units)
 
 
 def _missing(scene: Scene, pairs: Pairs, chosen: Indices, units: Array, load: Array) -> Array:
