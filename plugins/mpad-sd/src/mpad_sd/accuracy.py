@@ -18,7 +18,7 @@ from mpad_core.numerics.harmonics.layout import place, places
 
 SHARE = 0.045
 
-FAR = 30.0
+FAR = 48.0
 """What far spheres leave out falls as the square of the distance, in smaller radii, from which on they are far.
 
 Measured for eight to twelve spheres at gaps of 1e-3 to 1 and of 0.3 to 6, with reaches of 1.5, 4 and 8.

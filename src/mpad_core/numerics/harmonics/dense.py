@@ -13,7 +13,7 @@ import math
 import numpy as np
 from attrs import frozen
 
-from mpad_core.arrays import Array
+from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.harmonics.factors import summed
 from mpad_core.numerics.harmonics.far import MOMENTS, Far, moment_spots
@@ -71,7 +71,7 @@ def _add_far(system: System, far: Far, out: Array) -> None:
 
 
 @compiled
-def _rigid_rows(system: System) -> Array:
+def _rigid_rows(system: System) -> Indices:
     """Give where the rigid motions of all spheres lie, (6N,)."""
     at = system.at
     rows = np.empty(6 * len(at.degrees), dtype=np.int64)
