@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 class MpadError(Exception):
@@ -26,6 +27,23 @@ class PartError(MpadError):
 
 class RefusedError(MpadError):
     """The numerics refuse to answer: names what could not be treated, and where."""
+
+
+def refuse_first(solver: str, fault: str, values: Any, bad: Any) -> None:
+    """Refuse the first sphere that is bad, if there is one.
+
+    Parameters
+    ----------
+    solver
+        Who refuses.
+    fault
+        What is wrong with the sphere; ``{}`` stands for its value.
+    values, bad : (N, ...), (N,)
+        Arrays: of every sphere the value, and whether it is at fault.
+    """
+    if bad.any():
+        first = int(bad.argmax())
+        raise RefusedError(f"{solver}: sphere {first}: " + fault.format(values[first].tolist()))
 
 
 @contextmanager

@@ -1,11 +1,9 @@
 """What has no answer is refused by name before anything is computed."""
 
-from typing import Any
-
 import numpy as np
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.errors import RefusedError, refuse_first
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.numerics.neighbours import closest_pair
 
@@ -19,10 +17,10 @@ def refuse_bad(configuration: Configuration, setting: Setting) -> None:
         Naming the first sphere or pair at fault and its number.
     """
     centres, radii, gaps = configuration.centres, configuration.radii, configuration.wall_gaps
-    _refuse("centre {} is not finite", centres, ~np.isfinite(centres).all(axis=1))
-    _refuse("radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
+    refuse_first("cdl-biem", "centre {} is not finite", centres, ~np.isfinite(centres).all(axis=1))
+    refuse_first("cdl-biem", "radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
     if setting.wall:
-        _refuse("gap {} µm: it touches or cuts the wall", gaps, ~((gaps > 0) & np.isfinite(gaps)))
+        refuse_first("cdl-biem", "gap {} µm: it touches or cuts the wall", gaps, ~((gaps > 0) & np.isfinite(gaps)))
     i, j, gap = closest_pair(centres, radii)
     if not gap > 0:
         raise RefusedError(f"cdl-biem: spheres {i} and {j}: gap {gap} µm: they touch or overlap")
@@ -32,9 +30,3 @@ def refuse_loads(loads: Array) -> None:
     """Refuse loads that are not finite."""
     if not np.isfinite(loads).all():
         raise RefusedError("cdl-biem: the loads are not finite")
-
-
-def _refuse(fault: str, values: Array, bad: Any) -> None:
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise RefusedError(f"cdl-biem: sphere {first}: " + fault.format(values[first].tolist()))

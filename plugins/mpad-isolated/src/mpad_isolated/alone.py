@@ -1,13 +1,12 @@
 """Spheres alone: their mobilities and their motion in the flow."""
 
 import math
-from typing import Any
 
 import numpy as np
 from attrs import frozen
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.errors import RefusedError, refuse_first
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.wall_functions import wall_drift, wall_mobility, wall_shear_load
@@ -96,16 +95,10 @@ def refuse_bad(configuration: Configuration, wall: bool) -> None:
     RefusedError
         Naming the first sphere at fault and its number.
     """
-    radii, gaps = configuration.radii, configuration.wall_gaps
-    _refuse("centre {} is not finite", configuration.centres, ~np.isfinite(configuration.centres).all(axis=1))
-    _refuse("radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
+    centres, radii, gaps = configuration.centres, configuration.radii, configuration.wall_gaps
+    refuse_first("isolated", "centre {} is not finite", centres, ~np.isfinite(centres).all(axis=1))
+    refuse_first("isolated", "radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
     if wall:
-        heights = configuration.centres[:, 2]
-        _refuse("height {} µm of the centre is at or below the wall", heights, ~(heights > 0))
-        _refuse("gap {} µm: it touches or cuts the wall", gaps, ~((gaps > 0) & np.isfinite(gaps)))
-
-
-def _refuse(fault: str, values: Array, bad: Any) -> None:
-    faulty = np.flatnonzero(bad)
-    if faulty.size:
-        raise RefusedError(f"isolated: sphere {faulty[0]}: " + fault.format(values[faulty[0]].tolist()))
+        heights = centres[:, 2]
+        refuse_first("isolated", "height {} µm of the centre is at or below the wall", heights, ~(heights > 0))
+        refuse_first("isolated", "gap {} µm: it touches or cuts the wall", gaps, ~((gaps > 0) & np.isfinite(gaps)))

@@ -1,12 +1,10 @@
 """From a configuration to what solves it: refuse first, then matrix for few spheres, products for many."""
 
-from typing import Any
-
 import numpy as np
 from attrs import frozen
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.errors import refuse_first
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_rpb.dense import Dense
 from mpad_rpb.matrix_free import MatrixFree
@@ -40,21 +38,18 @@ def refuse_bad(configuration: Configuration, setting: Setting, exact: bool) -> N
     RefusedError
         Naming the first sphere at fault and its number.
     """
-    radii, heights, gaps = configuration.radii, configuration.centres[:, 2], configuration.wall_gaps
-    total = configuration.centres.sum() + radii.sum() + gaps.sum()
+    centres, radii, gaps = configuration.centres, configuration.radii, configuration.wall_gaps
+    heights = centres[:, 2]
+    total = centres.sum() + radii.sum() + gaps.sum()
     above = (not setting.wall or heights.min() > 0) and (not exact or gaps.min() > 0)
     if total - total == 0 and radii.min() > 0 and above:  # one pass over the good; what follows names the bad
         return
-    _refuse("centre {} is not finite", configuration.centres, ~np.isfinite(configuration.centres).all(axis=1))
-    _refuse("radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
+    refuse_first("rpb", "centre {} is not finite", centres, ~np.isfinite(centres).all(axis=1))
+    refuse_first("rpb", "radius {} µm is not positive", radii, ~((radii > 0) & np.isfinite(radii)))
     if setting.wall:
-        _refuse("height {} µm of the centre is at or below the wall", heights, ~(heights > 0))
-        _refuse("gap {} µm to the wall is not finite", gaps, ~np.isfinite(gaps))
+        refuse_first("rpb", "height {} µm of the centre is at or below the wall", heights, ~(heights > 0))
+        refuse_first("rpb", "gap {} µm to the wall is not finite", gaps, ~np.isfinite(gaps))
     if exact:
-        _refuse("gap {} µm: it touches or cuts the wall, which needs lone_sphere = 'blake'", gaps, ~(gaps > 0))
-
-
-def _refuse(fault: str, values: Array, bad: Any) -> None:
-    if bad.any():
-        first = int(np.argmax(bad))
-        raise RefusedError(f"rpb: sphere {first}: " + fault.format(values[first].tolist()))
+        refuse_first(
+            "rpb", "gap {} µm: it touches or cuts the wall, which needs lone_sphere = 'blake'", gaps, ~(gaps > 0)
+        )

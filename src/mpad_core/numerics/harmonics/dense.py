@@ -16,7 +16,7 @@ from attrs import frozen
 from mpad_core.arrays import Array, Indices
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.harmonics.factors import summed
-from mpad_core.numerics.harmonics.far import MOMENTS, Far, moment_spots
+from mpad_core.numerics.harmonics.far import MOMENTS, moment_spots
 from mpad_core.numerics.harmonics.krylov import System
 from mpad_core.numerics.harmonics.layout import spots
 from mpad_core.numerics.harmonics.levels import Level
@@ -50,9 +50,10 @@ def _add_near(system: System, out: Array) -> None:
 
 
 @compiled
-def _add_far(system: System, far: Far, out: Array) -> None:
+def _add_far(system: System, out: Array) -> None:
     """Add the blocks of the moments of all pairs that are not near."""
-    at, count, block = system.at, len(far.radii), np.empty((MOMENTS, MOMENTS))
+    at, far, block = system.at, system.far, np.empty((MOMENTS, MOMENTS))
+    count = len(far.radii)
     near = np.zeros((count, count), dtype=np.bool_)
     for k in range(len(far.near)):
         near[far.near[k, 0], far.near[k, 1]] = near[far.near[k, 1], far.near[k, 0]] = True
@@ -105,7 +106,7 @@ class Dense:
         rigid = _rigid_rows(system)
         coupled = np.zeros((size, size))
         _add_near(system, coupled)
-        _add_far(system, system.far, coupled)
+        _add_far(system, coupled)
         right = np.zeros((len(rigid) + 1, size))
         right[np.arange(len(rigid)), rigid] = 1.0
         right[-1] = -level.ambient
