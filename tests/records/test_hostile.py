@@ -105,7 +105,7 @@ def _crowd(path):
 
 
 def _newer(file):
-    file["mpad"].attrs["format"] = 2
+    file["mpad"].attrs["format"] = 3
 
 
 def _no_seed(file):
@@ -151,7 +151,7 @@ KINDS = {
     "truncated": (_truncated, "cannot be read as a trajectory"),
     "other program": (_other_program, "not written by mpad"),
     "other creator": (edited(_no_creator), "not written by mpad"),
-    "newer format": (edited(_newer), "has format 2, this mpad reads up to 1"),
+    "newer format": (edited(_newer), "has format 3, this mpad reads up to 2"),
     "external link": (linked(POSITIONS, h5py.ExternalLink("/etc/x.h5", "/x")), r"mpad/positions: is a link \(External"),
     "external root": (linked("mpad", h5py.ExternalLink("other.h5", "/mpad")), r"/mpad: is a link \(ExternalLink\)"),
     "soft link": (linked(POSITIONS, h5py.SoftLink("/particles/trajectory/position/value")), r"is a link \(SoftLink\)"),

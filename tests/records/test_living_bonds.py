@@ -5,7 +5,7 @@ from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.records.hdf5 import TrajectoryWriter
 from mpad_core.records.reader import living_bonds, read_trajectory
 
-FORMED, BROKEN = 0, 1
+FORMED, BROKEN, CHANGED = 0, 1, 2
 
 
 @pytest.fixture
@@ -44,3 +44,11 @@ def test_counts_agree_with_a_plain_replay(recorded):
         found = living_bonds(trajectory, time)
         assert {(int(bond["cell"]), int(bond["receptor"])) for bond in found} == expected[time]
         assert (found["kind"] == FORMED).all()
+
+
+def test_a_living_bond_has_the_state_of_its_last_change(recorded):
+    trajectory = recorded([(1.0, FORMED, 0, 7), (2.0, FORMED, 0, 8), (3.0, CHANGED, 0, 7)])
+    trajectory.bond_events["state"][2] = 1
+    assert living_bonds(trajectory, 2.5)["state"].tolist() == [0, 0]
+    assert living_bonds(trajectory, 3.0)["state"].tolist() == [1, 0]
+    assert living_bonds(trajectory, 3.0)["time"].tolist() == [1.0, 2.0]

@@ -23,12 +23,14 @@ BOND_EVENT = np.dtype(
     [
         ("time", "f8"),  # s
         ("step", "i8"),
-        ("kind", "u1"),  # 0 formed, 1 broken
+        ("kind", "u1"),  # 0 formed, 1 broken, 2 changed its inner state
         ("species", "u1"),  # index into the scene's bonds
+        ("state", "u1"),  # inner state of the bond, after the event; before it, if the bond broke
         ("cell", "i4"),
         ("receptor", "i8"),  # index of the molecule on its cell
-        ("ligand", "i8"),  # identity of the wall's molecule; -1 where the wall's molecules are not told apart
-        ("anchor_x", "f8"),  # µm, where the bond holds the wall
+        ("partner", "i4"),  # the other cell of a bond between cells; -1 for the wall
+        ("ligand", "i8"),  # index of the partner's molecule, or identity of the wall's; -1: not told apart
+        ("anchor_x", "f8"),  # µm, where the bond holds the wall, or the partner at that time
         ("anchor_y", "f8"),
         ("length", "f8"),  # µm
         ("force", "f8"),  # pN

@@ -11,13 +11,13 @@ from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.interfaces.observer import FieldDeclaration, Frame
 from mpad_core.records.header import TrajectoryHeader
 
-FORMAT = 1  # of the /mpad group; a reader refuses a higher one
+FORMAT = 2  # of the /mpad group; a reader refuses a higher one
 FRAMES = "frames"
 BOND_EVENTS = "bond_events"
 EVENTS_PATH = "/mpad/bond_events"
 ROW_SUMS_PATH = "/mpad/row_sums"
 EVENT_SUMS_PATH = "/mpad/bond_event_sums"
-EVENTS_UNIT = "s 1 1 1 1 1 1 um um um pN"  # one a column of BOND_EVENT
+EVENTS_UNIT = "s 1 1 1 1 1 1 1 1 um um um pN"  # one a column of BOND_EVENT
 OBSERVERS_PATH = "/mpad/observers"
 POSITION_PATH = "/particles/trajectory/position"
 NANOMETRES = 1e3  # in a µm

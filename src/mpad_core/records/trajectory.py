@@ -11,7 +11,8 @@ from mpad_core.interfaces.observer import FieldDeclaration, Frame
 from mpad_core.interfaces.values import Array
 from mpad_core.records.header import TrajectoryHeader
 
-_FORMED = 0  # BOND_EVENT's kind
+_FORMED, _CHANGED = 0, 2  # BOND_EVENT's kind
+_WHO = ["species", "cell", "receptor", "partner", "ligand"]  # no two living bonds have all of them alike
 
 
 @frozen(kw_only=True, eq=False, repr=False)
@@ -73,13 +74,22 @@ def living_bonds(trajectory: Trajectory, time: float) -> NDArray[np.void]:
     Returns
     -------
     (B,) of BOND_EVENT
-        the event in which each of them formed, in the order of forming
+        the event in which each of them formed, in the order of forming, with the inner state that it has at the time
     """
     past = trajectory.bond_events[trajectory.bond_events["time"] <= time]
     if not len(past):
         return past
-    bonds = past[["species", "cell", "receptor", "ligand"]][::-1]
-    _, last = np.unique(bonds, return_index=True)
-    rows = np.sort(len(past) - 1 - last)
-    alive: NDArray[np.void] = past[rows[past["kind"][rows] == _FORMED]]
+    latest = past[_last_of_each(past)]
+    turned = past["kind"] == _CHANGED
+    births = past[~turned][_last_of_each(past[~turned])]
+    alive: NDArray[np.void] = births[births["kind"] == _FORMED]
+    _, mine, current = np.intersect1d(alive[_WHO], latest[_WHO], assume_unique=True, return_indices=True)
+    alive["state"][mine] = latest["state"][current]
     return alive
+
+
+def _last_of_each(events: NDArray[np.void]) -> NDArray[np.intp]:
+    """Give the rows of the last event of every bond, ascending."""
+    _, last = np.unique(events[_WHO][::-1], return_index=True)
+    rows: NDArray[np.intp] = np.sort(len(events) - 1 - last)
+    return rows

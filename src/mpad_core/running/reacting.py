@@ -68,7 +68,9 @@ def record(
     event.step = step
     event.kind = kind
     event.species = bonds.species[bond]
+    event.state = 0
     event.cell = bonds.cell[bond]
+    event.partner = -1
     event.receptor = bonds.site[bond] - molecules.first[bonds.cell[bond]]
     event.ligand = bonds.ligand[bond]
     event.anchor_x = bonds.anchor[bond, 0]

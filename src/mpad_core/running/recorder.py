@@ -167,6 +167,7 @@ def _bonds_at_zero(machine: Machine, state: State) -> Any:
     """List the bonds that a preparation left, as formed at time zero, so that the table of events is complete."""
     bonds, events = state.bonds, np.zeros(len(state.bonds), BOND_EVENT)
     events["cell"], events["species"], events["ligand"] = bonds.cell, bonds.species, bonds.ligand
+    events["partner"] = -1
     events["receptor"] = bonds.site - machine.fixed.molecules.first[bonds.cell]
     events["anchor_x"], events["anchor_y"] = bonds.anchor[:, 0], bonds.anchor[:, 1]
     events["length"], events["force"] = machine.lengths_and_tensions(state)
