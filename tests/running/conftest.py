@@ -109,7 +109,8 @@ class Lab:
         cell = np.searchsorted(machine.fixed.molecules.first, site, side="right") - 1
         none = np.full(len(site), -1, np.int64)
         anchor = np.asarray(anchors, float).reshape(-1, 3)
-        bonds = BondList(cell=cell, site=site, species=np.zeros(len(site), np.int64), ligand=none, anchor=anchor)
+        zero = np.zeros(len(site), np.int64)
+        bonds = BondList(cell=cell, site=site, species=zero, state=zero, partner=none, ligand=none, anchor=anchor)
         return evolve(at_rest(machine), bonds=bonds)
 
 
@@ -124,8 +125,8 @@ def same() -> Callable[[State, State], bool]:
 
     def equal(a: State, b: State) -> bool:
         names = ("step", "zero", "time", "centres", "wall_gaps", "orientations", "velocities", "drift", "mean_loads")
-        more = ("bound_since", "bound_at", "caught_since")
-        bonds = ("cell", "site", "species", "ligand", "anchor")
+        more = ("clocks", "draws", "bound_since", "bound_at", "caught_since")
+        bonds = ("cell", "site", "species", "state", "partner", "ligand", "anchor")
         return all(np.array_equal(getattr(a, n), getattr(b, n)) for n in names + more) and all(
             np.array_equal(getattr(a.bonds, n), getattr(b.bonds, n)) for n in bonds
         )

@@ -105,6 +105,16 @@ def compiled_sums(function: Callable[P, R]) -> Callable[P, R]:
     return kernel
 
 
+def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `compiled` does, and put the code wherever it is called.
+
+    For what inner loops call: a call hands over each array of a named tuple one by one, at the price of a hundred sums.
+    """
+    inlined = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
+    kernel: Callable[P, R] = _forgiving(inlined(function))
+    return kernel
+
+
 def compiled_within(function: Callable[P, R]) -> Callable[P, R]:
     """Make a function part of the kernels that call it, by whose rules it is compiled.
 

@@ -3,10 +3,10 @@
 import math
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled_inline
 
 
-@compiled
+@compiled_inline
 def matrix_of(q: Array, out: Array) -> None:
     """Write the rotation matrix (3, 3) of a unit quaternion."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -21,7 +21,7 @@ def matrix_of(q: Array, out: Array) -> None:
     out[2, 2] = 1 - 2 * (x * x + y * y)
 
 
-@compiled
+@compiled_inline
 def turned(q: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     """Write q turned in space by the rotation vector (rx, ry, rz), normalised; `out` may be `q`."""
     angle = math.sqrt(rx * rx + ry * ry + rz * rz)
@@ -40,7 +40,7 @@ def turned(q: Array, rx: float, ry: float, rz: float, out: Array) -> None:
     out[3] = z * scale
 
 
-@compiled
+@compiled_inline
 def turned_vector(vx: float, vy: float, vz: float, rx: float, ry: float, rz: float) -> tuple[float, float, float]:
     """Give a vector turned by a rotation vector (Rodrigues)."""
     square = rx * rx + ry * ry + rz * rz

@@ -25,6 +25,7 @@ class Stream(IntEnum):
     LIGANDS = 5
     THERMAL = 6
     ANCHORS = 7
+    CLOCKS = 8
 
 
 Word: TypeAlias = Any  # an unsigned 64-bit integer, of numpy outside and of the machine inside compiled code

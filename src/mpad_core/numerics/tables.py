@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled_inline
 
 Function = Callable[[Array], Array]
 
@@ -124,7 +124,7 @@ def together(tables: Sequence[Tables], columns: int) -> Tables:
     )
 
 
-@compiled
+@compiled_inline
 def locate(tables: Tables, k: int, x: float) -> tuple[int, float, float]:
     """Give the row of x in table k, its coordinate there, and the coordinate's derivative."""
     pieces = tables.pieces[k]
@@ -141,18 +141,20 @@ def locate(tables: Tables, k: int, x: float) -> tuple[int, float, float]:
     return tables.first[k, piece] + cell, place - cell, scale
 
 
-@compiled
+@compiled_inline
 def value(tables: Tables, k: int, column: int, x: float) -> float:
     """Look one column of table k up at x."""
     row, t, _ = locate(tables, k, x)
-    c = tables.coefficients[row, column]
-    result: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    c = tables.coefficients
+    c0, c1, c2, c3 = c[row, column, 0], c[row, column, 1], c[row, column, 2], c[row, column, 3]
+    result: float = c0 + t * (c1 + t * (c2 + t * c3))
     return result
 
 
-@compiled
+@compiled_inline
 def value_and_slope(tables: Tables, k: int, column: int, x: float) -> tuple[float, float]:
     """Look one column of table k up at x, with its derivative."""
     row, t, scale = locate(tables, k, x)
-    c = tables.coefficients[row, column]
-    return c[0] + t * (c[1] + t * (c[2] + t * c[3])), scale * (c[1] + t * (2 * c[2] + 3 * t * c[3]))
+    c = tables.coefficients
+    c0, c1, c2, c3 = c[row, column, 0], c[row, column, 1], c[row, column, 2], c[row, column, 3]
+    return c0 + t * (c1 + t * (c2 + t * c3)), scale * (c1 + t * (2 * c2 + 3 * t * c3))

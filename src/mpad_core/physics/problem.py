@@ -52,6 +52,7 @@ class Tolerances:
 
     position: float  # µm
     rate: float  # relative
+    euler: float = 0.0  # s, step of the explicit scheme that is there for comparison; 0: implicit
 
 
 @frozen(kw_only=True)

@@ -13,13 +13,15 @@ from mpad_core.interfaces.values import BOND_EVENT
 
 @frozen(kw_only=True, eq=False)
 class BondList:
-    """The living bonds, oldest first."""
+    """The living bonds, one cell's after those of the cell before, each cell's oldest first."""
 
-    cell: Indices  # (B,)
+    cell: Indices  # (B,) ascending
     site: Indices  # (B,) index of the molecule among all cells' molecules
     species: Indices  # (B,)
-    ligand: Indices  # (B,) identity of the wall's molecule; -1 where not told apart
-    anchor: Array  # (B, 3) µm
+    state: Indices  # (B,) inner state
+    partner: Indices  # (B,) the other cell; -1 for the wall
+    ligand: Indices  # (B,) the partner's molecule, or the identity of the wall's; -1 where not told apart
+    anchor: Array  # (B, 3) µm; not used between cells
 
     def __len__(self) -> int:
         """Give the number of living bonds."""
@@ -29,7 +31,7 @@ class BondList:
 def no_bonds() -> BondList:
     """Give the empty list."""
     none = np.zeros(0, np.int64)
-    return BondList(cell=none, site=none, species=none, ligand=none, anchor=np.zeros((0, 3)))
+    return BondList(cell=none, site=none, species=none, state=none, partner=none, ligand=none, anchor=np.zeros((0, 3)))
 
 
 def _no_events() -> Any:
@@ -37,11 +39,28 @@ def _no_events() -> Any:
 
 
 @frozen(kw_only=True, eq=False)
+class Waypoint:
+    """Where the cells were on the way of an outer step; named as in State."""
+
+    step: int
+    time: float
+    centres: Array
+    wall_gaps: Array
+    orientations: Array
+    drift: Array  # (N, 6) mean velocity since the waypoint before
+
+    @classmethod
+    def start(cls, state: "State") -> "Waypoint":
+        """Give where a way begins."""
+        return cls(**{name: getattr(state, name) for name in attrs.fields_dict(cls)})
+
+
+@frozen(kw_only=True, eq=False)
 class State:
     """The state between two outer steps; N cells."""
 
-    step: int  # sub-steps done since the preparation began; keys the draws
-    zero: int  # the sub-step at which the clock showed zero
+    step: int  # grains of time since the preparation began; keys the draws
+    zero: int  # the step at which the clock showed zero
     time: float  # s
     centres: Array  # (N, 3) µm
     wall_gaps: Array  # (N,) µm, smooth sphere to wall
@@ -50,11 +69,14 @@ class State:
     drift: Array  # (N, 6) mean velocity over the last outer step
     mean_loads: Array  # (N, 6) mean over the last outer step of all loads but the fluid's
     bonds: BondList
+    clocks: Array  # (N,) how much hazard each cell uses up before its next event
+    draws: Array  # (N,) how many such numbers it has drawn; whole
     bound_since: Array  # (N,) s; infinite for a free cell
     bound_at: Array  # (N,) µm, x at that time
     caught_since: Array  # (N,) s; infinite until the cell is caught
     guess: Array | None = None  # of the solver
     events: Any = field(factory=_no_events)  # bond events of the last outer step; not part of what going on needs
+    trail: tuple[Waypoint, ...] = ()  # the way of the last outer step, this state its end; neither
 
     def bond_counts(self) -> Indices:
         """Give each cell's number of living bonds."""
@@ -63,7 +85,7 @@ class State:
 
 def to_arrays(state: State) -> dict[str, Any]:
     """Give the state as named arrays, for a checkpoint."""
-    named = attrs.asdict(state, recurse=False, filter=lambda a, _: a.name not in ("bonds", "events", "guess"))
+    named = attrs.asdict(state, recurse=False, filter=lambda a, _: a.name not in ("bonds", "events", "trail", "guess"))
     arrays = {f"state.{name}": np.asarray(value) for name, value in named.items()}
     arrays |= {f"bonds.{name}": value for name, value in attrs.asdict(state.bonds).items()}
     return arrays if state.guess is None else arrays | {"guess": state.guess}
@@ -76,6 +98,8 @@ _SHAPES: dict[str, tuple[int, ...]] = {
     "velocities": (6,),
     "drift": (6,),
     "mean_loads": (6,),
+    "clocks": (),
+    "draws": (),
     "bound_since": (),
     "bound_at": (),
     "caught_since": (),
@@ -89,12 +113,14 @@ def _check(state: State, cells: int, sites: int) -> None:
             raise ValueError(f"{name} is {found.dtype} of shape {found.shape}")
     bonds = state.bonds
     count = bonds.cell.shape[0] if bonds.cell.ndim else -1
-    for name in ("cell", "site", "species", "ligand"):
+    for name in ("cell", "site", "species", "state", "partner", "ligand"):
         found = getattr(bonds, name)
         if found.shape != (count,) or found.dtype.kind != "i":
             raise ValueError(f"bonds' {name} is {found.dtype} of shape {found.shape}")
     if bonds.anchor.shape != (count, 3) or (count and (bonds.cell.max() >= cells or bonds.site.max() >= sites)):
         raise ValueError("bonds hold cells or sites that are not there")
+    if (np.diff(bonds.cell) < 0).any():
+        raise ValueError("bonds are not in the order of their cells")
 
 
 def from_arrays(arrays: Mapping[str, Any], cells: int, sites: int) -> State:

@@ -1,10 +1,13 @@
 """From a problem to the data of the burst: laws tabulated, molecules placed; made once a run."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 from attrs import frozen
 
-from mpad_core.arrays import Array, Indices
+from mpad_core.arrays import Array, Flags, Indices
 from mpad_core.interfaces.errors import InputError, PartError
+from mpad_core.interfaces.values import BOND_EVENT
 from mpad_core.numerics.streams import key_of
 from mpad_core.numerics.tables import Tables, no_tables, tabulate, together
 from mpad_core.physics.asking import blamed
@@ -12,9 +15,26 @@ from mpad_core.physics.coupling import NOT_FELT, Coupling
 from mpad_core.physics.molecules import identity_of, place_sites
 from mpad_core.physics.problem import BondSpecies, Problem
 from mpad_core.physics.state import BondList, State
-from mpad_core.running.layout import Bodies, Bonds, Contacts, Groups, Molecules, Motion, Species, System, Thermal
-from mpad_core.running.reacting import MOST_LIGANDS, SQUARE
+from mpad_core.running.densities import Densities
+from mpad_core.running.layout import (
+    Bodies,
+    Bonds,
+    Candidates,
+    Clocks,
+    Contacts,
+    Groups,
+    Molecules,
+    Motion,
+    Progress,
+    Species,
+    System,
+    Thermal,
+    Trail,
+)
+from mpad_core.running.places import MOST_LIGANDS, SQUARE
+from mpad_core.running.shaking import TICKS
 
+_MOST_NOTED = 20_000  # places of cells on the way of one burst
 _FORCE_ERROR = 1e-6  # relative, of the tabulated repulsion
 
 
@@ -36,7 +56,11 @@ def _species(problem: Problem) -> Species:
     """Tabulate every species' law; with none, tables of length zero, and the modules that make them stay unloaded."""
     if not problem.species:
         empty = np.zeros(0)
-        return Species(no_tables(3), np.zeros(0, np.int64), empty, empty, np.zeros(0, np.uint8), empty)
+        none = np.zeros(0, np.int64)
+        return Species(
+            no_tables(3), np.zeros(1, np.int64), none, none, empty, empty, empty, np.zeros(0, np.uint8), empty,
+            no_tables(1), none,
+        )  # fmt: skip
     from mpad_core.physics.reactions import BondLaw
 
     for species in problem.species:
@@ -44,13 +68,19 @@ def _species(problem: Problem) -> Species:
     laws = [BondLaw(species=species) for species in problem.species]
     # in the reading "overlap" a bond that would push if it stood upright is born unstressed, hence tilted
     tilted = [s.reach == "overlap" and s.compression == "linear" for s in problem.species]
+    tables = [[law.tables()] for law in laws]
     return Species(
-        tables=together([law.tables() for law in laws], 3),
+        tables=together([table for own in tables for table in own], 3),
+        first=np.cumsum([0, *(len(own) for own in tables)]),
         site_kind=np.array([s.site_kind for s in problem.species], np.int64),
+        partner_kind=np.full(len(laws), -1, np.int64),
         reach=np.array([law.reach() for law in laws]),
+        slack_below=np.array([s.rest_length if s.compression == "slack" else -1.0 for s in problem.species]),
         least_length=np.array([s.rest_length * tilt for s, tilt in zip(problem.species, tilted, strict=True)]),
         pairwise=np.array([s.reach == "pairs" for s in problem.species], np.uint8),
         ligand_density=np.array([s.surface.densest() for s in problem.species]),
+        encounters=no_tables(1),
+        encounter=np.full(len(laws), -1, np.int64),
     )
 
 
@@ -158,24 +188,92 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
     )
     first = np.searchsorted(np.sort(owner), np.arange(len(sizes) + 1))
     contacts = Contacts(fixed.contact_law, fixed.contact_reach, np.ascontiguousarray(pairs), first)
-    density = local_density(problem, fixed, state.centres)
+    ratio = local_density(problem, fixed, state.centres)
+    k = len(problem.species)
+    density = Densities(
+        ratio.ravel().copy(),
+        np.arange(cells * k).reshape(cells, k),
+        np.zeros((cells, k), np.int64),
+        np.zeros((cells, k), np.int64),
+        np.ones((cells, k), np.int64),
+        np.full(k, np.inf),
+    )
     return System(fixed.bodies, fixed.molecules, fixed.species, contacts, groups, fixed.thermal, density)
 
 
-def bond_room(bonds: BondList, room: int) -> Bonds:
-    """Lay the living bonds out with room for `room`."""
-    n = len(bonds)
-    cell, site, species, ligand = np.zeros((4, room), np.int64)
-    laid = Bonds(np.array([n]), cell, site, species, ligand, np.zeros((room, 3)))
-    for name in ("cell", "site", "species", "ligand", "anchor"):
-        getattr(laid, name)[:n] = getattr(bonds, name)
-    return laid
+_BOND_FIELDS = ("site", "species", "state", "partner", "ligand", "anchor")
+_FEW = 512  # candidates of a cell, to begin with
+
+
+class Room(NamedTuple):
+    """What a burst fills, beside the motion: with so much room that it seldom has to ask for more."""
+
+    bonds: Bonds
+    bound: Flags
+    candidates: Candidates
+    events: Any
+
+
+def room_for(fixed: Fixed, bonds: BondList, cells: int, times: int = 1) -> Room:
+    """Lay the living bonds out, with room for more; `times` is by how much there is more of it than at first."""
+    counts = np.bincount(bonds.cell, minlength=cells)
+    first = np.concatenate([[0], np.cumsum(2 * counts + 64 * times)])
+    laid = _no_bonds(first, counts)
+    places = first[bonds.cell] + np.arange(len(bonds)) - (np.cumsum(counts) - counts)[bonds.cell]
+    for name in _BOND_FIELDS:
+        getattr(laid, name)[places] = getattr(bonds, name)
+    bound = np.zeros(len(fixed.molecules.kind), np.uint8)
+    bound[bonds.site] = 1
+    bound[bonds.ligand[bonds.partner >= 0]] = 1
+    events: Any = np.zeros(256 * times, BOND_EVENT)
+    return Room(laid, bound, _candidates(fixed, times), events)
+
+
+def _no_bonds(first: Indices, counts: Indices) -> Bonds:
+    room = int(first[-1])
+    site, species, state, partner, ligand = np.zeros((5, room), np.int64)
+    vectors = (np.zeros((room, 3)) for _ in range(3))
+    return Bonds(first, counts, site, species, state, partner, ligand, *vectors)
+
+
+def _candidates(fixed: Fixed, times: int) -> Candidates:
+    sites = np.diff(fixed.molecules.first)
+    several = 8 if fixed.species.pairwise.any() else 1
+    first = np.concatenate([[0], np.cumsum(several * times * np.minimum(sites, _FEW))])
+    cells, room = len(sites), int(first[-1])
+    site, species, ligand, partner = (np.empty(room, np.int64) for _ in range(4))
+    return Candidates(
+        first, np.zeros(cells, np.int64), site, species, ligand, partner, np.empty(room), np.empty(room),
+        fixed.molecules.first, np.zeros(cells, np.int64), np.empty(int(sites.sum()), np.int64), np.zeros((cells, 2)),
+        np.zeros((cells, 2)), np.zeros((cells, 2, 3)), np.zeros((cells, 2, 3)),
+    )  # fmt: skip
 
 
 def bond_list(bonds: Bonds) -> BondList:
     """Take the living bonds out of their room."""
-    n = int(bonds.living[0])
-    return BondList(**{k: getattr(bonds, k)[:n].copy() for k in ("cell", "site", "species", "ligand", "anchor")})
+    cell = np.repeat(np.arange(len(bonds.count)), bonds.count)
+    places = bonds.first[cell] + np.arange(len(cell)) - (np.cumsum(bonds.count) - bonds.count)[cell]
+    return BondList(cell=cell, **{name: getattr(bonds, name)[places] for name in _BOND_FIELDS})
+
+
+def clocks_of(state: State) -> Clocks:
+    """Copy the clocks of events."""
+    return Clocks(state.clocks.copy(), state.draws.astype(np.int64))
+
+
+def progress_of(groups: int, cells: int) -> Progress:
+    """Give the progress of a burst that has not begun."""
+    one = [np.zeros(1, np.int64) for _ in range(3)]
+    slots = groups + cells
+    return Progress(one[0], np.zeros(slots, np.int64), np.full(slots, TICKS, np.int64), one[1], one[2])
+
+
+def trail_for(cells: int, most: int) -> Trail:
+    """Make room for the way of a burst of at most so many sub-steps."""
+    every = -(-most * cells // _MOST_NOTED)
+    room = most // every + 1
+    vectors = [np.empty((room, cells, n)) for n in (3, 4, 3)]
+    return Trail(every, np.zeros(room, np.int64), vectors[0], np.empty((room, cells)), vectors[1], vectors[2])
 
 
 def motion_of(state: State) -> Motion:

@@ -1,100 +1,294 @@
-"""Many sub-steps between two calls of the solver: react → loads → implicit motion → move, compiled."""
+"""Many sub-steps between two calls of the solver: react → loads → implicit motion → move, compiled.
+
+The groups of cells do not see each other within a burst, so each goes through a sub-step in parts of its own: as long
+as the error of its motion allows, and never beyond its next event. A part is tried; where a clock runs out within it,
+the group is moved only up to that moment, and what then happens is drawn from the rates there.
+"""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from mpad_core.arrays import Array, Flags, Indices
+from mpad_core.arrays import Array, Flags
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.streams import Word
-from mpad_core.running.layout import Attached, Bonds, Dice, Limits, Motion, System
-from mpad_core.running.moving import DONE, TOO_LONG, advance, attach, refresh_turns
-from mpad_core.running.reacting import break_bonds, form_bonds, list_candidates
+from mpad_core.running.clocks import EARLY, LATE, choice, drawn, share_until, used_until
+from mpad_core.running.layout import (
+    Bonds,
+    Candidates,
+    Clocks,
+    Dice,
+    Limits,
+    Motion,
+    Progress,
+    System,
+    Trail,
+    Work,
+)
+from mpad_core.running.listing import reaches_out, refresh
+from mpad_core.running.moving import advance, attach, commit, refresh_turns, step_explicitly
+from mpad_core.running.reacting import happen, rates, slip_factors
 from mpad_core.running.resisting import is_positive_definite, resistance
 from mpad_core.running.shaking import TICKS, draw, longest_part
 
 REACHED, ROOM_NEEDED, NOT_POSITIVE, NO_BALANCE = 0, 1, 2, 3  # why a burst ended
-_LISTING_MARGIN = 0.03  # µm: molecules this far out of reach are listed too, and the list stands until they could reach
+_STEEP = 3.0  # ratio of a sub-step's two rates beyond which two points are too few
+_UNCERTAIN = 0.02  # of the hazard used up between two rates so different: by how much it may be wrong
+_HELD_STEPS = 5  # explicit steps over which rates are taken as constant
+_GROWTH = 4.0  # from one part of a sub-step to the next
 
 
 @compiled
-def _reach_height(system: System) -> float:
-    """Give the height below which a molecule can bind."""
-    reach = -math.inf
-    for kind in range(system.species.reach.shape[0]):
-        reach = max(reach, system.species.reach[kind])
-    return system.bodies.wall_tips + reach
-
-
-class _Listing(NamedTuple):
-    """The molecules near the wall, and how long the list stands."""
-
-    sites: Indices  # (S,) room for all
-    first: Indices  # (N + 1,) each cell's first place in the list
-    slack: Array  # (N,) µm, how much nearer a cell's molecules may come before the list is too short
-    lever: Array  # (N,) µm, how far from the axis of the cell's turn the first to come would be
-    height: Array  # (N,) µm, of the centre when the list was made
-    turn: Array  # (N, 3) motion.turn at that time
+def _work_for(group: int, system: System) -> Work:
+    """Make room for the sub-steps of a group."""
+    cells = system.bodies.radius.shape[0]
+    members = system.groups.cells[system.groups.first[group] : system.groups.first[group + 1]]
+    m = 6 * members.shape[0]
+    return Work(
+        system.bodies.radius[members], np.empty((m, m)), np.empty((m, m)), np.empty(m), np.empty(m), np.empty(m),
+        np.empty(m), np.empty(m), np.empty(m), np.zeros(m), np.empty(cells), np.empty((cells, 3)),
+        np.empty((cells, 4)), np.empty((cells, 3)), np.empty((cells, 3, 3)), np.empty((cells, 3)),
+        np.empty((cells, 3, 3)),
+    )  # fmt: skip
 
 
 @compiled
-def _list_near(system: System, motion: Motion, turns: Array, listing: _Listing) -> None:
-    """List every cell's molecules within reach of the wall or little more."""
-    lowest = _reach_height(system) + _LISTING_MARGIN
-    cells = listing.slack.shape[0]
-    at = 0
-    for cell in range(cells):
-        listing.first[cell] = at
-        shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
-        bottom = motion.centre[cell, 2] - shell
-        depth = min(max(lowest - bottom, 0.0), shell)
-        listing.slack[cell] = max(_LISTING_MARGIN, bottom - lowest + _LISTING_MARGIN)
-        listing.lever[cell] = math.sqrt(depth * (2 * shell - depth)) + _LISTING_MARGIN
-        listing.height[cell] = motion.centre[cell, 2]
-        listing.turn[cell] = motion.turn[cell]
-        if bottom < lowest:
-            at = list_candidates(cell, lowest, system.molecules, motion, turns[cell], listing.sites, at)
-    listing.first[cells] = at
+def _between(cell: int, share: float, motion: Motion, turn: Array, work: Work) -> None:
+    """Write a cell's place and turn at a share of the way that is being tried."""
+    for i in range(3):
+        work.middle[cell, i] = motion.centre[cell, i] + share * (work.centre[cell, i] - motion.centre[cell, i])
+        for j in range(3):
+            work.middle_turn[cell, i, j] = turn[cell, i, j] + share * (work.turn[cell, i, j] - turn[cell, i, j])
 
 
 @compiled
-def _list_is_short(motion: Motion, listing: _Listing) -> bool:
-    """Tell whether a molecule that is not listed may have come within reach."""
-    short = False
-    for cell in range(listing.slack.shape[0]):
-        drop = max(listing.height[cell] - motion.centre[cell, 2], 0.0)
-        turn_x = motion.turn[cell, 0] - listing.turn[cell, 0]
-        turn_y = motion.turn[cell, 1] - listing.turn[cell, 1]
-        nearer = drop + math.sqrt(turn_x * turn_x + turn_y * turn_y) * listing.lever[cell]
-        short = short or nearer > listing.slack[cell]
-    return short
+def _look_ahead(
+    group: int, dt: float, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, work: Work,
+    listed: Candidates, clocks: Clocks, rate: float, ahead: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """Look for the first event on the way that is being tried.
+
+    Returns
+    -------
+    share
+        Of the way, up to the event; 1 without one. Zero where the rates change too much over it for two points.
+    cell
+        Whose event it is; -1 without one. Each cell's two rates are written into `ahead` (N, 2).
+    """
+    groups = system.groups
+    first, whose = 1.0, -1
+    factor = np.empty(system.species.site_kind.shape[0])
+    for k in range(groups.first[group], groups.first[group + 1]):
+        cell = groups.cells[k]
+        ahead[cell, 0] = ahead[cell, 1] = 0.0
+        if bonds.count[cell] + listed.count[cell] == 0:
+            continue
+        place = k - groups.first[group]
+        slip_factors(cell, work.velocity[6 * place : 6 * place + 6], motion.gap[cell], system, factor)
+        for point, share in enumerate((EARLY, LATE)):
+            _between(cell, share, motion, turn, work)
+            ahead[cell, point], _, _ = rates(
+                cell, math.inf, work.middle, work.middle_turn, system, bonds, bound, listed, factor
+            )
+        low, high = min(ahead[cell, 0], ahead[cell, 1]), max(ahead[cell, 0], ahead[cell, 1])
+        if high > _STEEP * low and _UNCERTAIN * (high - low) * dt > rate:
+            return -1.0, -1
+        share = share_until(clocks.left[cell], ahead[cell, 0], ahead[cell, 1], dt)
+        if share < first:
+            first, whose = share, cell
+    return first, whose
+
+
+@compiled
+def _wind(
+    group: int, share: float, dt: float, whose: int, system: System, key: Word, clocks: Clocks, ahead: Array
+) -> None:
+    """Take what the first `share` of a way of dt uses up from a group's clocks; wind that of the cell whose event it is."""
+    for k in range(system.groups.first[group], system.groups.first[group + 1]):
+        cell = system.groups.cells[k]
+        if cell == whose:
+            clocks.count[cell] += 1
+            clocks.left[cell] = drawn(key, system.molecules.owner[cell], clocks.count[cell])
+        else:
+            clocks.left[cell] -= used_until(share, ahead[cell, 0], ahead[cell, 1], dt)
+
+
+@compiled
+def _let_happen(
+    cell: int, velocity: Array, step: int, time: float, key: Word, system: System, bonds: Bonds, bound: Flags,
+    motion: Motion, turn: Array, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
+) -> None:  # fmt: skip
+    """Draw which event a cell's clock stands for, from the rates of the moment, and let it happen.
+
+    The clock has been wound already, so the draw is the one that belongs to the number before.
+    """
+    factor = np.empty(system.species.site_kind.shape[0])
+    slip_factors(cell, velocity, motion.gap[cell], system, factor)
+    total, _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
+    share = choice(key, system.molecules.owner[cell], clocks.count[cell] - 1)
+    _, which, excess = rates(cell, share * total, motion.centre, turn, system, bonds, bound, listed, factor)
+    if which >= 0:
+        happen(
+            cell, which, excess, step, time, motion.centre, turn, key, system, bonds, bound, listed, clocks, progress,
+            events,
+        )  # fmt: skip
+
+
+@compiled
+def _is_ready(
+    cell: int, system: System, bonds: Bonds, motion: Motion, turn: Array, dice: Dice, listed: Candidates,
+    progress: Progress, events: Array,
+) -> bool:  # fmt: skip
+    """Bring a cell's lists and its bonds' arms up to date; tell whether there is room for them and for an event."""
+    if system.species.site_kind.shape[0] == 0:
+        return True
+    if bonds.first[cell] + bonds.count[cell] >= bonds.first[cell + 1] or progress.events[0] >= events.shape[0]:
+        return False
+    attach(cell, turn[cell], system.molecules, bonds)
+    return refresh(cell, system, motion, turn[cell], dice, listed)
+
+
+@compiled
+def _strays(group: int, system: System, motion: Motion, work: Work, listed: Candidates) -> int:
+    """Tell whether the way that is tried leads beyond what is listed: 1 if new lists would do, 2 if it is too long."""
+    stray = 0
+    if system.species.site_kind.shape[0] > 0:
+        for k in range(system.groups.first[group], system.groups.first[group + 1]):
+            stray = max(stray, reaches_out(system.groups.cells[k], system, motion, work, listed))
+    return stray
 
 
 @compiled
 def _move_group(
-    group: int, step: int, dt: float, system: System, bonds: Bonds, attached: Attached, motion: Motion, turns: Array,
-    key: Word, noise: Array,
+    group: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits, dice: Dice,
+    listed: Candidates, clocks: Clocks, progress: Progress, events: Array, work: Work, ahead: Array,
 ) -> int:  # fmt: skip
-    """Move a group over sub-step `step`, in as many parts as it takes."""
-    left = TICKS
-    part = TICKS
-    while left > 0:
-        part = min(part, left)
+    """Move a group to the end of the sub-step that is under way, in as many parts as it takes."""
+    step = dice.step + progress.beats[0] * dice.stride
+    first, last = system.groups.first[group], system.groups.first[group + 1]
+    shaken = system.thermal.energy.shape[0] > 0
+    while progress.tick[group] < TICKS:
+        for k in range(first, last):
+            cell = system.groups.cells[k]
+            if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
+                return ROOM_NEEDED
+        tick = progress.tick[group]
+        part = min(progress.part[group], TICKS - tick)
         for k in range(system.thermal.energy.shape[0]):
-            part = min(part, longest_part(group, dt, system.thermal.energy[k], system, motion.gap))
-            draw(group, system, key, step, TICKS - left, TICKS - left + part, dt, noise)
-        outcome = advance(group, dt * part / TICKS, system, bonds, attached, motion, noise)
-        if outcome == DONE:
-            left -= part
-            part *= 2
-            if left > 0:
-                refresh_turns(motion, turns)
-                attach(bonds, system.molecules, turns, attached)
-        elif outcome == TOO_LONG and part > 1:
-            part //= 2
-        else:
-            return NO_BALANCE
+            part = min(part, longest_part(group, limits.sub_step, system.thermal.energy[k], system, motion.gap))
+            draw(group, system, dice.key, step, tick, tick + part, limits.sub_step, work.noise)
+        dt = limits.sub_step * part / TICKS
+        error = advance(group, dt, system, bonds, motion, work)
+        stray = 0 if error == math.inf else _strays(group, system, motion, work, listed)
+        if stray == 1:
+            for k in range(first, last):
+                listed.near_count[system.groups.cells[k]] = -1
+            continue
+        if error == math.inf or stray == 2 or (error > limits.error and not shaken):
+            if part == 1:
+                return NO_BALANCE
+            shorter = 0.5 if error == math.inf or stray == 2 else max(0.9 * math.sqrt(limits.error / error), 0.1)
+            progress.part[group] = max(int(part * shorter), 1)
+            continue
+        share, whose = _look_ahead(
+            group, dt, system, bonds, bound, motion, turn, work, listed, clocks, limits.rate, ahead
+        )
+        if share < 0 and part > 1:
+            progress.part[group] = part // 2
+            continue
+        done = part
+        if whose >= 0:
+            done = min(max(math.ceil(share * part), 1), part)
+            if done < part:
+                for k in range(system.thermal.energy.shape[0]):
+                    draw(group, system, dice.key, step, tick, tick + done, limits.sub_step, work.noise)
+                if advance(group, limits.sub_step * done / TICKS, system, bonds, motion, work) == math.inf:
+                    progress.part[group] = max(done // 2, 1)
+                    continue
+        _wind(group, abs(share), dt, whose, system, dice.key, clocks, ahead)
+        commit(group, limits.sub_step * done / TICKS, system, motion, turn, work)
+        if whose >= 0:
+            place = 6 * system.groups.place[whose]
+            time = (tick + share * part) / TICKS
+            _let_happen(
+                whose, work.velocity[place : place + 6], step, time, dice.key, system, bonds, bound, motion, turn,
+                listed, clocks, progress, events,
+            )  # fmt: skip
+        longer = _GROWTH if error <= 0.05 * limits.error or shaken else max(0.9 * math.sqrt(limits.error / error), 0.5)
+        progress.tick[group] = tick + done
+        progress.part[group] = min(int(part * longer) + 1, TICKS)
+    return REACHED
+
+
+@compiled
+def _move_explicitly(
+    group: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits, dice: Dice,
+    listed: Candidates, clocks: Clocks, progress: Progress, events: Array, work: Work, ahead: Array,
+) -> int:  # fmt: skip
+    """Move a group to the end of the sub-step that is under way by explicit steps, for comparison.
+
+    Rates are those of the start of every few steps, and an event happens at the end of the step in which it is due.
+    """
+    step = dice.step + progress.beats[0] * dice.stride
+    first, last = system.groups.first[group], system.groups.first[group + 1]
+    factor = np.empty(system.species.site_kind.shape[0])
+    steps = max(round(limits.sub_step / limits.euler[0]), 1)
+    dt = limits.sub_step / steps
+    while progress.tick[group] < TICKS:
+        done = progress.part[group] % TICKS  # steps of this sub-step
+        for k in range(first, last):
+            cell = system.groups.cells[k]
+            if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
+                return ROOM_NEEDED
+            if done % _HELD_STEPS == 0 or ahead[cell, 1] < 0:
+                slip_factors(cell, motion.velocity[cell], motion.gap[cell], system, factor)
+                ahead[cell, 0], _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
+                ahead[cell, 1] = 0.0
+            clocks.left[cell] -= ahead[cell, 0] * dt
+        step_explicitly(group, dt, system, bonds, motion, work)
+        commit(group, dt, system, motion, turn, work)
+        for k in range(first, last):
+            cell = system.groups.cells[k]
+            if not clocks.left[cell] > 0:
+                clocks.count[cell] += 1
+                clocks.left[cell] = drawn(dice.key, system.molecules.owner[cell], clocks.count[cell])
+                _let_happen(
+                    cell, motion.velocity[cell], step, (done + 1) / steps, dice.key, system, bonds, bound, motion,
+                    turn, listed, clocks, progress, events,
+                )  # fmt: skip
+                ahead[cell, 1] = -1.0
+        progress.part[group] = done + 1 if done + 1 < steps else TICKS
+        progress.tick[group] = (done + 1) * (TICKS // steps) if done + 1 < steps else TICKS
+    return REACHED
+
+
+@compiled
+def _wait(
+    cell: int, slot: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits,
+    dice: Dice, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
+) -> int:  # fmt: skip
+    """Let happen what happens to a cell that does not move, up to the end of the sub-step that is under way."""
+    step = dice.step + progress.beats[0] * dice.stride
+    factor, velocity = np.empty(system.species.site_kind.shape[0]), np.zeros(6)
+    while progress.tick[slot] < TICKS:
+        if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
+            return ROOM_NEEDED
+        slip_factors(cell, velocity, motion.gap[cell], system, factor)
+        total, _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
+        part = TICKS - progress.tick[slot]
+        dt = limits.sub_step * part / TICKS
+        share = share_until(clocks.left[cell], total, total, dt)
+        if share > 1:
+            clocks.left[cell] -= total * dt
+            progress.tick[slot] = TICKS
+            continue
+        clocks.count[cell] += 1
+        clocks.left[cell] = drawn(dice.key, system.molecules.owner[cell], clocks.count[cell])
+        time = (progress.tick[slot] + share * part) / TICKS
+        _let_happen(
+            cell, velocity, step, time, dice.key, system, bonds, bound, motion, turn, listed, clocks, progress, events
+        )
+        progress.tick[slot] += min(max(math.ceil(share * part), 1), part)
     return REACHED
 
 
@@ -116,67 +310,75 @@ def _must_end(motion: Motion, limits: Limits) -> bool:
 
 
 @compiled
-def _refused_group(system: System, motion: Motion) -> int:
-    """Give the first group whose frozen coupling no longer fits its heights; -1 if all do."""
-    for group in range(system.groups.first.shape[0] - 1):
-        m = 6 * (system.groups.first[group + 1] - system.groups.first[group])
-        matrix, right = np.empty((m, m)), np.empty(m)
-        resistance(group, system, motion.gap, matrix, right)
-        if not is_positive_definite(matrix):
-            return group
-    return -1
+def _fits(group: int, system: System, motion: Motion, work: Work) -> bool:
+    """Tell whether a group's frozen coupling fits its heights."""
+    resistance(group, system, motion.gap, work.matrix, work.right)
+    return is_positive_definite(work.matrix)
+
+
+@compiled
+def _note(motion: Motion, stride: int, trail: Trail, progress: Progress) -> None:
+    """Note where the cells are."""
+    at = progress.trail[0]
+    trail.step[at] = progress.beats[0] * stride
+    trail.centre[at] = motion.centre
+    trail.gap[at] = motion.gap
+    trail.orientation[at] = motion.orientation
+    trail.turn[at] = motion.turn
+    progress.trail[0] = at + 1
 
 
 @compiled
 def burst(
-    system: System, bonds: Bonds, bound: Flags, motion: Motion, limits: Limits, dice: Dice, events: Array,
-    event_count: Indices,
-) -> tuple[int, int, int]:  # fmt: skip
-    """Run sub-steps until a limit is met; change `bonds`, `bound`, `motion` and fill `events`.
+    system: System, bonds: Bonds, bound: Flags, motion: Motion, limits: Limits, dice: Dice, listed: Candidates,
+    clocks: Clocks, progress: Progress, trail: Trail, events: Array,
+) -> tuple[int, int]:  # fmt: skip
+    """Run sub-steps until a limit is met; change all that is not frozen, and fill `trail` and `events`.
 
     Returns
     -------
     outcome
-        REACHED; ROOM_NEEDED when bonds or events may not fit another sub-step, NOT_POSITIVE when the frozen coupling
-        no longer fits: both before anything of that sub-step was done; NO_BALANCE when no sub-step however short
-        balances the loads, which leaves the state unusable.
-    sub_steps
-        How many were done.
+        REACHED; ROOM_NEEDED where bonds, candidates or events may not fit, after which the burst may be called again,
+        with more room, and goes on; NOT_POSITIVE when the frozen coupling no longer fits, at the end of a sub-step;
+        NO_BALANCE when no part of a sub-step however short balances the loads, which leaves the state unusable.
     group
         The group that was refused.
     """
-    cells = motion.gap.shape[0]
-    turns = np.empty((cells, 3, 3))
-    listing = _Listing(
-        np.empty(system.molecules.kind.shape[0], np.int64), np.zeros(cells + 1, np.int64), np.zeros(cells),
-        np.zeros(cells), np.zeros(cells), np.zeros((cells, 3)),
-    )  # fmt: skip
-    room = bonds.cell.shape[0]
-    attached = Attached(np.zeros(cells + 1, np.int64), np.zeros(room, np.int64), np.empty((room, 3)))
-    noise = np.empty(system.thermal.energy.shape[0] * 6 * system.groups.cells.shape[0])
-    groups = system.groups.first.shape[0] - 1
-    dt = limits.sub_step
-    for done in range(limits.most):
-        step = dice.step + done
-        refresh_turns(motion, turns)
-        if done == 0 or _list_is_short(motion, listing):
-            _list_near(system, motion, turns, listing)
-        listed = listing.first[cells]
-        if bonds.living[0] + listed > room or event_count[0] + bonds.living[0] + listed > events.shape[0]:
-            return ROOM_NEEDED, done, -1
-        unfit = _refused_group(system, motion)
-        if unfit >= 0:
-            return NOT_POSITIVE, done, unfit
-        if listed > 0 or bonds.living[0] > 0:  # calls with nothing to do would cost a quarter of the sub-step
-            break_bonds(bonds, bound, system, motion, turns, dice, step, dt, events, event_count)
-            form_bonds(
-                listing.sites, listing.first, bonds, bound, system, motion, turns, dice, step, dt, events, event_count
-            )
-            attach(bonds, system.molecules, turns, attached)
+    cells, groups = motion.gap.shape[0], system.groups.first.shape[0] - 1
+    turn = np.empty((cells, 3, 3))
+    refresh_turns(motion, turn)
+    ahead = np.zeros((cells, 2))
+    listed.near_count[:] = -1
+    works = [_work_for(group, system) for group in range(groups)]
+    while progress.beats[0] < limits.most:
         for group in range(groups):
-            outcome = _move_group(group, step, dt, system, bonds, attached, motion, turns, dice.key, noise)
+            if progress.tick[group] == 0 and not _fits(group, system, motion, works[group]):
+                return NOT_POSITIVE, group
+            if limits.euler.shape[0] == 0:
+                outcome = _move_group(
+                    group, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress, events,
+                    works[group], ahead,
+                )  # fmt: skip
+            else:
+                outcome = _move_explicitly(
+                    group, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress, events,
+                    works[group], ahead,
+                )  # fmt: skip
             if outcome != REACHED:
-                return outcome, done, group
-        if _must_end(motion, limits):
-            return REACHED, done + 1, -1
-    return REACHED, limits.most, -1
+                return outcome, group
+        for cell in range(cells):
+            if system.groups.place[cell] < 0:
+                outcome = _wait(
+                    cell, groups + cell, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress,
+                    events,
+                )  # fmt: skip
+                if outcome != REACHED:
+                    return outcome, -1
+        progress.beats[0] += 1
+        progress.tick[:] = 0
+        ends = _must_end(motion, limits) or progress.beats[0] == limits.most
+        if ends or progress.beats[0] % trail.every == 0:
+            _note(motion, dice.stride, trail, progress)
+        if ends:
+            break
+    return REACHED, -1

@@ -9,12 +9,20 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.observer import Frame
 from mpad_core.physics.measures import Hazards
 from mpad_core.physics.problem import Problem
-from mpad_core.physics.state import State
+from mpad_core.physics.state import State, Waypoint
 from mpad_core.running.schedules import Schedule
 
 
-def frame_of(problem: Problem, hazards: Hazards, before: State, after: State, share: float) -> Frame:
-    """Give the frame at a share of the way from one state to the next; positions are interpolated linearly."""
+def frame_of(problem: Problem, hazards: Hazards, state: State) -> Frame:
+    """Give the frame of a state."""
+    return _frame(problem, hazards, state, state, state.step - state.zero, 1.0, state.bond_counts())
+
+
+def _frame(
+    problem: Problem, hazards: Hazards, before: State | Waypoint, after: State | Waypoint, step: int, share: float,
+    counts: Any,
+) -> Frame:  # fmt: skip
+    """Give the frame at a share of the way from one place to the next; positions are interpolated linearly."""
 
     def between(a: Array, b: Array) -> Array:
         return b if share == 1.0 else a + share * (b - a)
@@ -24,7 +32,7 @@ def frame_of(problem: Problem, hazards: Hazards, before: State, after: State, sh
     centres = between(before.centres, after.centres)
     gaps = between(before.wall_gaps, after.wall_gaps)
     return Frame(
-        step=before.step + round(share * (after.step - before.step)) - after.zero,
+        step=step,
         time=time,
         cells=problem.names,
         centres=centres,
@@ -32,15 +40,13 @@ def frame_of(problem: Problem, hazards: Hazards, before: State, after: State, sh
         velocities=after.drift,
         wall_gaps=gaps if problem.setting.wall else np.full(len(gaps), np.inf),
         overlaps=centres[:, 2] - problem.zero_overlap,
-        bond_counts=_bond_counts(before, after, time).astype(float),
+        bond_counts=counts.astype(float),
         capture_hazards=hazards.at(centres),
     )
 
 
 def _bond_counts(before: State, after: State, time: float) -> Any:
     """Count each cell's bonds at a time: those before, and the events since."""
-    if before is after:  # its own events are in its counts already
-        return after.bond_counts()
     counts = before.bond_counts()
     past = after.events[after.events["time"] <= time]
     np.add.at(counts, past["cell"], np.where(past["kind"] == 0, 1, -1))
@@ -48,6 +54,11 @@ def _bond_counts(before: State, after: State, time: float) -> Any:
 
 
 def frames(problem: Problem, hazards: Hazards, schedule: Schedule, before: State, after: State) -> Iterator[Frame]:
-    """Yield the frames that are due between two states."""
-    for share in schedule.due(problem, before, after):
-        yield frame_of(problem, hazards, before, after, share)
+    """Yield the frames that are due between two states, from waypoint to waypoint."""
+    start: State | Waypoint = before
+    for point in after.trail or (after,):
+        for share in schedule.due(problem, start, point):
+            step = start.step + round(share * (point.step - start.step)) - after.zero
+            counts = _bond_counts(before, after, start.time + share * (point.time - start.time))
+            yield _frame(problem, hazards, start, point, step, share, counts)
+        start = point

@@ -10,6 +10,7 @@ from mpad_core.physics.coupling import lone_cell
 from mpad_core.physics.molecules import site_counts
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, no_bonds
+from mpad_core.running.clocks import drawn
 from mpad_core.running.march import Machine, configuration_of, make_ready, march
 
 ZERO = 1 << 40  # the sub-step of time zero: the same with and without preparations, and so are the draws after it
@@ -32,6 +33,8 @@ def at_rest(machine: Machine) -> State:
         drift=np.zeros((cells, 6)),
         mean_loads=problem.external.copy(),
         bonds=no_bonds(),
+        clocks=np.array([drawn(machine.fixed.key, owner, 0) for owner in machine.fixed.molecules.owner]),
+        draws=np.zeros(cells),
         bound_since=np.full(cells, np.inf),
         bound_at=problem.start[:, 0].copy(),
         caught_since=np.full(cells, np.inf),
@@ -85,11 +88,13 @@ def _placed(problem: Problem, state: State, rolled: State, cell: int) -> State:
         cell=np.concatenate([state.bonds.cell, np.full(len(own), cell)]),
         site=np.concatenate([state.bonds.site, own.site + first_site]),
         species=np.concatenate([state.bonds.species, own.species]),
+        state=np.concatenate([state.bonds.state, own.state]),
+        partner=np.concatenate([state.bonds.partner, own.partner]),
         ligand=np.concatenate([state.bonds.ligand, own.ligand]),
         anchor=np.concatenate([state.bonds.anchor, own.anchor + shift]),
     )
     changed = {"centres": rolled.centres[0] + shift}
-    names = ("wall_gaps", "orientations", "velocities", "drift", "mean_loads")
+    names = ("wall_gaps", "orientations", "velocities", "drift", "mean_loads", "clocks", "draws")
     changed |= {name: getattr(rolled, name)[0] for name in names}
     changed["caught_since"] = 0.0 if np.isfinite(rolled.caught_since[0]) else np.inf
     changed["bound_since"] = 0.0 if len(own) else np.inf

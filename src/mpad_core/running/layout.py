@@ -8,6 +8,7 @@ from typing import NamedTuple
 from mpad_core.arrays import Array, Flags, Indices
 from mpad_core.numerics.streams import Word
 from mpad_core.numerics.tables import Tables
+from mpad_core.running.densities import Densities
 
 
 class Bodies(NamedTuple):
@@ -32,25 +33,34 @@ class Molecules(NamedTuple):
 
 
 class Species(NamedTuple):
-    """The kinds of bond; K of them."""
+    """The kinds of bond; K of them, each with one inner state or more."""
 
-    tables: Tables  # columns: tension (pN), off-rate (1/s), on-rate (1/s) over length (µm)
+    tables: Tables  # of one inner state each; columns: tension (pN), off-rate, on-rate, rates of exchange (1/s)
+    first: Indices  # (K + 1,) each kind's first table: that of inner state 0
     site_kind: Indices  # (K,) which kind of site on the cell takes part
-    reach: Array  # (K,) µm, tip gap beyond which no bond forms
+    partner_kind: Indices  # (K,) and which on the other cell; -1: the wall's
+    reach: Array  # (K,) µm, tip gap, or distance of two molecules, beyond which no bond forms
+    slack_below: Array  # (K,) µm, length below which a bond does not pull, nor push
     least_length: Array  # (K,) µm, length that a bond is at least born with (tilted if need be)
     pairwise: Flags  # (K,) whether the wall's molecules are told apart
     ligand_density: Array  # (K,) 1/µm², densest of the wall's molecules that are told apart
+    encounters: Tables  # column: factor on the on-rate over slip speed (µm/s)
+    encounter: Indices  # (K,) which of them; -1 for a kind whose on-rate does not depend on slip
 
 
 class Bonds(NamedTuple):
-    """Living bonds, in the order of their birth; room for B."""
+    """Living bonds, each with the cell that keeps it; a cell's stand together, oldest first."""
 
-    living: Indices  # (1,) how many
-    cell: Indices  # (B,)
+    first: Indices  # (N + 1,) each cell's first place; its room ends at the next cell's
+    count: Indices  # (N,) how many live
     site: Indices  # (B,) index into Molecules
     species: Indices  # (B,)
-    ligand: Indices  # (B,) identity of the wall's molecule, -1 where not told apart
-    anchor: Array  # (B, 3) µm, where the bond holds the wall
+    state: Indices  # (B,) inner state
+    partner: Indices  # (B,) the other cell; -1 for the wall
+    ligand: Indices  # (B,) the other molecule: index into Molecules, or the wall's identity; -1 where not told apart
+    anchor: Array  # (B, 3) µm, where the bond holds the wall; not used between cells
+    arm: Array  # (B, 3) µm, from the cell's centre to the molecule, in space; written by each sub-step
+    other_arm: Array  # (B, 3) µm, the same on the other cell
 
 
 class Contacts(NamedTuple):
@@ -88,15 +98,7 @@ class System(NamedTuple):
     contacts: Contacts
     groups: Groups
     thermal: Thermal
-    density_ratio: Array  # (N, K) the wall's site density under each cell, by the one that the on-rate is given at
-
-
-class Attached(NamedTuple):
-    """The living bonds sorted by cell, with their arms turned into space; rebuilt every sub-step."""
-
-    first: Indices  # (N + 1,) each cell's first place in the order
-    order: Indices  # (B,) bonds
-    arm: Array  # (B, 3) µm
+    densities: Densities  # of the wall's sites around each cell, by the one that the on-rate is given at
 
 
 class Motion(NamedTuple):
@@ -110,11 +112,64 @@ class Motion(NamedTuple):
     impulse: Array  # (N, 6) loads other than the fluid's, integrated over time
 
 
+class Work(NamedTuple):
+    """What the sub-steps of one group of n cells are worked out in, and where the one being tried ends; m = 6n."""
+
+    radius: Array  # (n,) µm
+    matrix: Array  # (m, m) r + C
+    stiffness: Array  # (m, m)
+    right: Array  # (m,) f + k + g
+    load: Array  # (m,) all other loads
+    velocity: Array  # (m,)
+    residual: Array  # (m,)
+    change: Array  # (m,)
+    moved: Array  # (m,)
+    noise: Array  # (m,) s^½, increments of the Brownian paths
+    gaps: Array  # (N,) µm; the rest as in Motion, for all cells
+    centre: Array  # (N, 3)
+    orientation: Array  # (N, 4)
+    rotation: Array  # (N, 3) as motion.turn
+    turn: Array  # (N, 3, 3) rotation matrices
+    middle: Array  # (N, 3) and (N, 3, 3): between start and end
+    middle_turn: Array
+
+
+class Clocks(NamedTuple):
+    """Each cell's clock of events: the next one happens when the hazard integrated since the last has used it up."""
+
+    left: Array  # (N,) of a random number that is exponential with mean one
+    count: Indices  # (N,) numbers drawn so far, by which the next ones are keyed
+
+
+class Progress(NamedTuple):
+    """How far a burst has come; it may leave to be given more room and go on."""
+
+    beats: Indices  # (1,) whole sub-steps done
+    tick: Indices  # (groups + N,) how far each group, and each held cell, has come in the sub-step that is under way
+    part: Indices  # (groups + N,) how long, in ticks, the next part of its way is to be
+    events: Indices  # (1,) how many stand in the table
+    trail: Indices  # (1,) how many places of the way have been noted
+
+
+class Trail(NamedTuple):
+    """The way of the cells through a burst, noted at the end of every few sub-steps; room for W."""
+
+    every: int  # sub-steps
+    step: Indices  # (W,) sub-steps done
+    centre: Array  # (W, N, 3) µm
+    gap: Array  # (W, N)
+    orientation: Array  # (W, N, 4)
+    turn: Array  # (W, N, 3)
+
+
 class Limits(NamedTuple):
     """When a burst must end."""
 
     sub_step: float  # s
     most: int  # sub-steps
+    error: float  # µm, of a cell's surface over the part of a sub-step that it moves at once
+    rate: float  # relative, of the rates of events
+    euler: Array  # (1,) s, step of the explicit scheme; (0,) for the implicit one
     start: Array  # (N, 3) µm, centres when the coupling was frozen
     pairs: Indices  # (P, 2)
     pair_move: Array  # (P,) µm, relative displacement allowed
@@ -126,4 +181,25 @@ class Dice(NamedTuple):
     """What the draws of this burst are keyed by."""
 
     key: Word
-    step: int  # of the burst's first sub-step
+    step: int  # at which the burst begins
+    stride: int  # from one sub-step to the next
+
+
+class Candidates(NamedTuple):
+    """What may bind to what: the molecules of each cell near the wall, or near another cell, and how long they stand."""
+
+    first: Indices  # (N + 1,) each cell's first place; its room ends at the next cell's
+    count: Indices  # (N,)
+    site: Indices  # (C,)
+    species: Indices  # (C,)
+    ligand: Indices  # (C,) as in Bonds
+    partner: Indices  # (C,)
+    x: Array  # (C,) µm, of the wall's molecule, where they are told apart
+    y: Array  # (C,)
+    near_first: Indices  # (N + 1,) as first, for the molecules that are only near
+    near_count: Indices  # (N,)
+    near: Indices  # (S,) sites
+    slack: Array  # (N, 2) µm, how much nearer molecules may come before candidates, or near ones, must be listed anew
+    lever: Array  # (N, 2) µm, how far from the axis of the cell's turn the first to come would be
+    centre: Array  # (N, 2, 3) µm, of the cell when they were listed
+    turn: Array  # (N, 2, 3) motion.turn at that time

@@ -6,25 +6,25 @@ same steps.
 """
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from attrs import evolve, frozen
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
-from mpad_core.interfaces.values import BOND_EVENT, Configuration
+from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.tables import value
 from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, coupler, drift_of, lone_velocity
 from mpad_core.physics.problem import Problem
-from mpad_core.physics.state import State
+from mpad_core.physics.state import BondList, State, Waypoint
 from mpad_core.running import assembly, pace
 from mpad_core.running.burst import NO_BALANCE, NOT_POSITIVE, ROOM_NEEDED, burst
-from mpad_core.running.layout import Dice, Limits, Motion
+from mpad_core.running.layout import Clocks, Dice, Limits, Motion, Progress, Trail
 from mpad_core.running.moving import refresh_turns
-from mpad_core.running.reacting import TENSION, length_of
+from mpad_core.running.reacting import TENSION, bond_length
 
-_EVENTS = 4096  # room to begin with; it grows
+_MORE_ROOM = 4  # times as much whenever a burst asks for it
 
 
 @frozen(kw_only=True, eq=False)
@@ -42,11 +42,15 @@ class Machine:
         bonds, turns = state.bonds, np.empty((len(state.wall_gaps), 3, 3))
         motion = assembly.motion_of(state)
         refresh_turns(motion, turns)
-        laid = assembly.bond_room(bonds, len(bonds))
-        lengths = np.array([length_of(b, laid, self.fixed.molecules, motion, turns) for b in range(len(bonds))])
-        tables = self.fixed.species.tables
-        tensions = [value(tables, k, TENSION, x) for k, x in zip(bonds.species, lengths, strict=True)]
-        return lengths, np.array(tensions)
+        laid = assembly.room_for(self.fixed, bonds, len(turns)).bonds
+        places = [b for c in range(len(turns)) for b in range(laid.first[c], laid.first[c] + laid.count[c])]
+        molecules, species = self.fixed.molecules, self.fixed.species
+        lengths = [
+            bond_length(b, c, motion.centre, turns, laid, molecules) for b, c in zip(places, bonds.cell, strict=True)
+        ]
+        rows = species.first[bonds.species] + bonds.state
+        tensions = [value(species.tables, k, TENSION, x) for k, x in zip(rows, lengths, strict=True)]
+        return np.array(lengths), np.array(tensions)
 
 
 def make_ready(problem: Problem, plan: Any = None) -> Machine:
@@ -57,7 +61,7 @@ def make_ready(problem: Problem, plan: Any = None) -> Machine:
     fixed = assembly.assemble(problem)
     coupling = coupler(problem, plan)
     return Machine(
-        problem=problem, fixed=fixed, pace=pace.choose_pace(problem, fixed), coupler=coupling,
+        problem=problem, fixed=fixed, pace=pace.choose_pace(problem), coupler=coupling,
         drift=drift_of(problem, coupling),
     )  # fmt: skip
 
@@ -84,7 +88,7 @@ def march(machine: Machine, state: State, until: float) -> Iterator[State]:
         If the solver or the balance of loads refuses, naming the cells.
     """
     yield state
-    while state.time < until - 0.5 * machine.pace.sub_step:
+    while state.time < until - 0.5 * machine.pace.grain:
         state = step(machine, state, until)
         yield state
 
@@ -93,12 +97,11 @@ def step(machine: Machine, state: State, until: float) -> State:
     """Take one outer step."""
     problem = machine.problem
     moves = pace.pair_moves(problem, _coupled_pairs(machine, state), state.centres, machine.pace.share)
-    length = pace.expected_length(machine.pace, moves, state.drift)
-    middle = _ahead(problem, state, 0.5 * min(length, until - state.time))
+    stride = pace.stride_of(machine.pace, moves, state.drift, until - state.time)
+    middle = _ahead(problem, state, 0.5 * stride.sub_steps * stride.grains * machine.pace.grain)
     coupling = machine.drift.added(machine.coupler.at(middle, state.mean_loads, state.guess), middle, state.step)
-    left = until - state.time
-    bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, left)
-    return _burst(machine, state, coupling, bounds)
+    bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, stride)
+    return _burst(machine, state, coupling, bounds, stride.grains)
 
 
 def _coupled_pairs(machine: Machine, state: State) -> Any:
@@ -108,31 +111,39 @@ def _coupled_pairs(machine: Machine, state: State) -> Any:
     return assembly.near_pairs(problem, state.centres, np.inf if bounding else -np.inf)
 
 
-def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits) -> State:
+class _Done(NamedTuple):
+    """What a burst has made."""
+
+    motion: Motion
+    clocks: Clocks
+    bonds: BondList
+    events: Any
+    progress: Progress
+    trail: Trail
+
+
+def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits, stride: int) -> State:
     """Run the burst, with as much room for bonds and events as it needs; make the next state of its outcome."""
     problem, fixed = machine.problem, machine.fixed
     data = assembly.system(problem, fixed, state, coupling, contact_range(problem))
-    motion = assembly.motion_of(state)
-    bound = np.zeros(len(fixed.molecules.kind), np.uint8)
-    bound[state.bonds.site] = 1
-    bonds = assembly.bond_room(state.bonds, 2 * len(state.bonds) + _EVENTS)
-    events: list[Any] = []
-    total = 0
-    while True:
-        buffer: Any = np.zeros(len(bonds.cell) + _EVENTS, BOND_EVENT)
-        filled = np.zeros(1, np.int64)
-        left = bounds._replace(most=bounds.most - total)
-        outcome, done, group = burst(
-            data, bonds, bound, motion, left, Dice(fixed.key, state.step + total), buffer, filled
+    motion, clocks = assembly.motion_of(state), assembly.clocks_of(state)
+    cells = len(state.wall_gaps)
+    progress, trail = assembly.progress_of(len(coupling.groups), cells), assembly.trail_for(cells, bounds.most)
+    dice = Dice(fixed.key, state.step, stride)
+    outcome, times, bonds, events = ROOM_NEEDED, 1, state.bonds, []
+    while outcome == ROOM_NEEDED:
+        room = assembly.room_for(fixed, bonds, cells, times)
+        outcome, group = burst(
+            data, room.bonds, room.bound, motion, bounds, dice, room.candidates, clocks, progress, trail, room.events
         )
-        total += done
-        events.append(buffer[: filled[0]])
-        if outcome != ROOM_NEEDED:
-            break
-        bonds = assembly.bond_room(assembly.bond_list(bonds), 2 * len(bonds.cell) + _EVENTS)
-    if outcome == NO_BALANCE or (outcome == NOT_POSITIVE and total == 0):
+        bonds = assembly.bond_list(room.bonds)
+        events.append(room.events[: progress.events[0]])
+        progress.events[0] = 0
+        times *= _MORE_ROOM
+    if outcome == NO_BALANCE or (outcome == NOT_POSITIVE and progress.beats[0] == 0):
         _refuse(machine, state, coupling, outcome, group)
-    return _next(machine, state, motion, assembly.bond_list(bonds), np.concatenate(events), total, coupling)
+    made = _Done(motion, clocks, bonds, np.concatenate(events), progress, trail)
+    return _next(machine, state, made, coupling, stride)
 
 
 def _refuse(machine: Machine, state: State, coupling: Coupling, outcome: int, group: int) -> None:
@@ -145,30 +156,51 @@ def _refuse(machine: Machine, state: State, coupling: Coupling, outcome: int, gr
     )
 
 
-def _next(
-    machine: Machine, state: State, motion: Motion, bonds: Any, events: Any, steps: int, coupling: Coupling
-) -> State:
+def _next(machine: Machine, state: State, made: _Done, coupling: Coupling, stride: int) -> State:
+    steps = int(made.progress.beats[0]) * stride
     done = state.step + steps
-    now = (done - state.zero) * machine.pace.sub_step
-    lasted = steps * machine.pace.sub_step
-    events["step"] -= state.zero
-    events["time"] = events["step"] * machine.pace.sub_step
+    lasted = steps * machine.pace.grain
+    motion = made.motion
     moved = motion.centre - state.centres
     following = evolve(
         state,
         step=done,
-        time=now,
+        time=(done - state.zero) * machine.pace.grain,
         centres=motion.centre,
         wall_gaps=motion.gap,
         orientations=motion.orientation,
         velocities=motion.velocity,
         drift=np.concatenate([moved, motion.turn], axis=1) / lasted,
         mean_loads=motion.impulse / lasted,
-        bonds=bonds,
+        bonds=made.bonds,
+        clocks=made.clocks.left,
+        draws=made.clocks.count.astype(float),
         guess=coupling.guess,
-        events=events,
+        events=_in_order(made.events, state.zero, stride, machine.pace.grain),
+        trail=tuple(_waypoints(state, made, machine.pace.grain)),
     )
     return _with_captures(machine.problem, following)
+
+
+def _in_order(events: Any, zero: int, stride: int, grain: float) -> Any:
+    """Put events in the order of time; they hold when their sub-step began, and the share of it until then."""
+    events["step"] -= zero
+    events["time"] = (events["step"] + events["time"] * stride) * grain
+    return events[np.argsort(events["time"], kind="stable")]
+
+
+def _waypoints(state: State, made: _Done, grain: float) -> Iterator[Waypoint]:
+    """Yield the places that the burst has noted, its end last."""
+    before, trail = Waypoint.start(state), made.trail
+    turn = np.zeros((len(state.wall_gaps), 3))
+    for k in range(int(made.progress.trail[0])):
+        step = state.step + int(trail.step[k])
+        moved = np.concatenate([trail.centre[k] - before.centres, trail.turn[k] - turn], axis=1)
+        before, turn = Waypoint(
+            step=step, time=(step - state.zero) * grain, centres=trail.centre[k], wall_gaps=trail.gap[k],
+            orientations=trail.orientation[k], drift=moved / ((step - before.step) * grain),
+        ), trail.turn[k]  # fmt: skip
+        yield before
 
 
 def _with_captures(problem: Problem, state: State) -> State:

@@ -1,57 +1,68 @@
 """How long steps may be: the sub-step of the burst, and how far a frozen coupling is used."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from attrs import frozen
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.numerics.tables import value
 from mpad_core.physics.coupling import contact_reach
 from mpad_core.physics.problem import Problem
-from mpad_core.running.assembly import Fixed, pair_gaps
+from mpad_core.running.assembly import pair_gaps
 from mpad_core.running.layout import Limits
 from mpad_core.running.moving import LARGEST_TURN
-from mpad_core.running.reacting import OFF_RATE, ON_RATE
 from mpad_core.running.shaking import RMS_SHARE
 
 _MOST_SUB_STEPS = 1000  # in one burst, so that a run can be told to stop
 _GAP_CHANGE = 0.2  # of a cell's gap to the wall over which the frozen coupling may be combined with r(h)
 _LARGEST_SUB_STEP = 1e-3  # s, where nothing else bounds it
+_SHEARED = 0.05  # of 1/shear rate: the longest sub-step for a position error of 0.1 nm
+_USUAL = 1e-4  # µm, that error
+_BURST = 20  # longest sub-steps in the longest burst
+_FARTHER = 1.5  # than they may: at which a burst ends before its time
+_DIGITS = 3  # of the longest sub-step, in grains
 _RANGE_SHARE = 0.2  # of the repulsion's range that thermal motion may cross in a sub-step
-_VERTICAL = 0.01  # vertical velocities are this fraction of the flow's past a cell, or less
 
 
 @frozen(kw_only=True)
 class Pace:
     """The step lengths of a run."""
 
-    sub_step: float  # s
+    sub_step: float  # s, the longest
     longest: float  # s, of a burst
     share: float  # η: of the gap between two cells that they may move relative to each other in a burst
+    error: float  # µm, local error of a motion
+    rate: float  # relative error of the rates of events
+    euler: float = 0.0  # s, step of the explicit scheme; 0: implicit
+
+    @property
+    def grain(self) -> float:
+        """Give the time (s) that all times of states are multiples of: a power of ten."""
+        return float(f"1e{math.floor(math.log10(self.sub_step)) - _DIGITS}")
 
 
-def choose_pace(problem: Problem, fixed: Fixed) -> Pace:
+def choose_pace(problem: Problem) -> Pace:
     """Choose the steps from the accuracies asked for.
 
-    A test of P = 1 − exp(−k Δt) a sub-step delays events by Δt/2, a relative error k Δt/2 of their rate: the largest
-    on-rate and the unstressed off-rates bound the sub-step. Backward Euler errs by Δt/2 times the change of the
-    velocity; the height must stay within ``position``. The coupling is taken in the middle of a burst, so its error
-    grows with η².
+    What smooth motions err by in a sub-step grows with its square, and so does the error of a coupling taken in the
+    middle of a burst with η. Motions that stiff loads make short of that bound their steps themselves, by their
+    estimated error, and events by their clocks.
     """
-    tolerances = problem.tolerances
-    bounds = [_LARGEST_SUB_STEP]
-    bounds += [2 * tolerances.rate / rate for rate in _fastest(problem, fixed) if rate > 0]
-    settling = np.abs(problem.external[:, :3]).max() / (6 * np.pi * problem.setting.viscosity * problem.radii.min())
-    bounds += _thermal_steps(problem)
-    vertical = _VERTICAL * abs(problem.setting.shear_rate) * float(problem.radii.max()) + float(settling)
-    if vertical > 0:
-        bounds.append(2 * tolerances.position / vertical)
-    sub_step = float(f"{min(bounds):.1e}")
+    position = problem.tolerances.position
     shear = abs(problem.setting.shear_rate)
-    longest = max(0.1 / shear if shear > 0 else 0.01, sub_step)
-    share = float(np.clip(0.02 * np.sqrt(tolerances.position / 1e-4), 0.002, 0.1))
-    return Pace(sub_step=sub_step, longest=longest, share=share)
+    bounds = [_LARGEST_SUB_STEP, *_thermal_steps(problem)]
+    if shear > 0:
+        bounds.append(_SHEARED / shear * np.sqrt(position / _USUAL))
+    sub_step = float(f"{min(bounds):.1e}")
+    return Pace(
+        sub_step=sub_step,
+        longest=_BURST * sub_step,
+        share=float(np.clip(0.02 * np.sqrt(position / _USUAL), 0.002, 0.1)),
+        error=position,
+        rate=problem.tolerances.rate,
+        euler=problem.tolerances.euler,
+    )
 
 
 def _thermal_steps(problem: Problem) -> list[float]:
@@ -97,17 +108,6 @@ def _repelling(problem: Problem) -> tuple[float, float]:
     return problem.thermal_energy / float(force[k]), float(gaps[k])
 
 
-def _fastest(problem: Problem, fixed: Fixed) -> list[float]:
-    """Give the rates (1/s) that events have in an unstressed bond, or in one about to form, for every species."""
-    rates = []
-    for k, species in enumerate(problem.species):
-        lengths = np.linspace(0.0, float(fixed.species.reach[k]), 201)
-        crowded = 1.0 if species.reach == "pairs" else species.surface.densest() / species.at_density
-        rates.append(crowded * max(value(fixed.species.tables, k, ON_RATE, x) for x in lengths))
-        rates.append(value(fixed.species.tables, k, OFF_RATE, species.rest_length))
-    return rates
-
-
 class PairMoves(NamedTuple):
     """How far pairs of cells may move relative to each other in a burst."""
 
@@ -128,23 +128,37 @@ def pair_moves(problem: Problem, pairs: Indices, centres: Array, share: float) -
     return PairMoves(pairs, apart)
 
 
-def expected_length(pace: Pace, moves: PairMoves, drift: Array) -> float:
-    """Give how long (s) the next burst will last if the cells go on as before."""
-    if len(moves.pairs) == 0:
-        return pace.longest
-    speeds = np.linalg.norm(drift[moves.pairs[:, 0], :3] - drift[moves.pairs[:, 1], :3], axis=1)
-    times = moves.allowed / np.maximum(speeds, 1e-300)
-    # a burst ends with the first whole sub-step that passes a limit
-    whole = max(np.ceil(min(pace.longest, times.min()) / pace.sub_step * (1 - 1e-9)), 1.0)
-    return float(whole * pace.sub_step)
+@frozen(kw_only=True)
+class Stride:
+    """How a burst is to be cut into sub-steps."""
+
+    grains: int  # in one sub-step
+    sub_steps: int
 
 
-def limits(problem: Problem, pace: Pace, moves: PairMoves, centres: Array, middle_gaps: Array, left: float) -> Limits:
-    """Give the limits of a burst whose coupling was taken at `middle_gaps`; `left` (s) is the time to the run's end."""
-    wanted = min(pace.longest, left)
-    most = int(np.clip(np.ceil(wanted / pace.sub_step * (1 - 1e-9)), 1, _MOST_SUB_STEPS))
-    most = min(most, max(round(left / pace.sub_step), 1))  # the run ends at the sub-step nearest to its end
+def stride_of(pace: Pace, moves: PairMoves, drift: Array, left: float) -> Stride:
+    """Choose the length of the next burst: until the cells, if they go on as before, have moved as far as they may.
+
+    `left` (s) is the time to the run's end, to be met within a grain.
+    """
+    time = pace.longest
+    if len(moves.pairs):
+        speeds = np.linalg.norm(drift[moves.pairs[:, 0], :3] - drift[moves.pairs[:, 1], :3], axis=1)
+        time = min(time, float((moves.allowed / np.maximum(speeds, 1e-300)).min()))
+    grains = max(round(min(time, left) / pace.grain), 1)
+    sub_steps = int(np.clip(math.ceil(grains * pace.grain / pace.sub_step * (1 - 1e-9)), 1, _MOST_SUB_STEPS))
+    return Stride(grains=max(grains // sub_steps, 1), sub_steps=sub_steps)
+
+
+def limits(
+    problem: Problem, pace: Pace, moves: PairMoves, centres: Array, middle_gaps: Array, stride: Stride
+) -> Limits:
+    """Give the limits of a burst whose coupling was taken at `middle_gaps`."""
     free = problem.setting.wall & problem.coupled
     low = middle_gaps * (1 - _GAP_CHANGE) if free else np.full(len(middle_gaps), -np.inf)
     high = middle_gaps * (1 + _GAP_CHANGE) if free else np.full(len(middle_gaps), np.inf)
-    return Limits(pace.sub_step, most, centres, moves.pairs, moves.allowed, low, high)
+    euler = np.full(1 if pace.euler > 0 else 0, pace.euler)
+    return Limits(
+        stride.grains * pace.grain, stride.sub_steps, pace.error, pace.rate, euler, centres, moves.pairs,
+        _FARTHER * moves.allowed, low, high,
+    )  # fmt: skip

@@ -1,225 +1,267 @@
-"""Formation and rupture of bonds over one sub-step: items (i) and (ii) of King & Hammer (PNAS 2001), compiled.
-
-Every free molecule within reach of the wall is tested against P = 1 − exp(−k_on Δt), every bond against
-P = 1 − exp(−k_off Δt), at the lengths of the sub-step's start. Each draw is keyed by the molecules and the sub-step, so
-the list of candidates may be any list that holds all molecules within reach.
-"""
+"""Formation, rupture and change of bonds: their rates, the choice of an event, and the event itself; compiled."""
 
 import math
 
-import numpy as np
-
-from mpad_core.arrays import Array, Flags, Indices
-from mpad_core.numerics.compiled import compiled
-from mpad_core.numerics.streams import Stream, mixed, uniform, uniform_pair
+from mpad_core.arrays import Array, Flags
+from mpad_core.numerics.compiled import compiled, compiled_inline
+from mpad_core.numerics.streams import Stream, Word, mixed, uniform
 from mpad_core.numerics.tables import value
-from mpad_core.running.layout import Bonds, Dice, Molecules, Motion, Species, System
+from mpad_core.running.densities import density_at
+from mpad_core.running.layout import Bonds, Candidates, Clocks, Molecules, Progress, Species, System
+from mpad_core.running.places import distance, place_of
 
-_FORMATION = int(Stream.FORMATION)
-_RUPTURE = int(Stream.RUPTURE)
-_LIGANDS = int(Stream.LIGANDS)
 _ANCHORS = int(Stream.ANCHORS)
-TENSION, OFF_RATE, ON_RATE = 0, 1, 2  # columns of the bond tables
-SQUARE = 0.1  # µm, side of the squares in which the wall's molecules are laid out
-MOST_LIGANDS = 255  # in a square; each has a number of 8 bits
+TENSION, OFF_RATE, ON_RATE, EXCHANGE = 0, 1, 2, 3  # columns of the bond tables; the last is the first of several
+FORMED, BROKEN, CHANGED = 0, 1, 2  # kinds of event
+
+
+@compiled_inline
+def bond_length(bond: int, cell: int, centre: Array, turn: Array, bonds: Bonds, molecules: Molecules) -> float:
+    """Give the length of a cell's bond to the wall."""
+    x, y, z = place_of(bonds.site[bond], centre[cell], turn[cell], molecules)
+    return distance(x, y, z, bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2])
+
+
+@compiled_inline
+def _leaving_rate(kind: int, state: int, length: float, species: Species) -> float:
+    """Give the rate at which a bond breaks or changes its state."""
+    table = species.first[kind] + state
+    rate = value(species.tables, table, OFF_RATE, length)
+    for to in range(species.first[kind + 1] - species.first[kind]):
+        if to != state:
+            rate += value(species.tables, table, EXCHANGE + to, length)
+    return rate
 
 
 @compiled
-def list_candidates(
-    cell: int, lowest: float, molecules: Molecules, motion: Motion, turn: Array, out: Indices, at: int
-) -> int:
-    """List the molecules of a cell below height `lowest` from place `at` on; give the place after the last."""
-    height = motion.centre[cell, 2]
-    for site in range(molecules.first[cell], molecules.first[cell + 1]):
-        arm = molecules.arm[site]
-        if height + turn[2, 0] * arm[0] + turn[2, 1] * arm[1] + turn[2, 2] * arm[2] < lowest:
-            out[at] = site
-            at += 1
-    return at
+def _is_taken(kind: int, ligand: int, bonds: Bonds) -> bool:
+    """Tell whether one of the wall's molecules is bound already, to whichever cell."""
+    for cell in range(bonds.count.shape[0]):
+        first = bonds.first[cell]
+        for bond in range(first, first + bonds.count[cell]):
+            if bonds.ligand[bond] == ligand and bonds.species[bond] == kind and bonds.partner[bond] < 0:
+                return True
+    return False
+
+
+@compiled_inline
+def _birth_length(pairwise: bool, lateral: float, gap: float, reach: float, least: float) -> float:
+    """Give how long the bond of a candidate would be at first; infinity where it is out of reach.
+
+    `lateral` (µm) is the distance along the wall from the molecule that it would bind to.
+    """
+    length = math.sqrt(lateral * lateral + gap * gap) if pairwise else abs(gap)
+    within = (length if pairwise else gap) <= reach
+    return max(length, least) if within else math.inf
+
+
+@compiled_inline
+def _forming_rate(kind: int, length: float, species: Species) -> float:
+    """Give the rate at which a bond forms, in whichever inner state."""
+    rate = 0.0
+    for table in range(species.first[kind], species.first[kind + 1]):
+        rate += value(species.tables, table, ON_RATE, length)
+    return rate
 
 
 @compiled
-def place_of(site: int, cell: int, molecules: Molecules, motion: Motion, turn: Array) -> tuple[float, float, float]:
-    """Give where a molecule is."""
-    arm = molecules.arm[site]
-    return (
-        motion.centre[cell, 0] + turn[0, 0] * arm[0] + turn[0, 1] * arm[1] + turn[0, 2] * arm[2],
-        motion.centre[cell, 1] + turn[1, 0] * arm[0] + turn[1, 1] * arm[1] + turn[1, 2] * arm[2],
-        motion.centre[cell, 2] + turn[2, 0] * arm[0] + turn[2, 1] * arm[1] + turn[2, 2] * arm[2],
-    )
+def rates(
+    cell: int, stop: float, centre: Array, turn: Array, system: System, bonds: Bonds, bound: Flags, listed: Candidates,
+    factor: Array,
+) -> tuple[float, int, float]:  # fmt: skip
+    """Sum the rates of all that can happen to a cell, its bonds first, until the sum exceeds `stop`.
+
+    One of the wall's molecules that is bound already is not left out: `happen` lets nothing happen to it, which is the
+    same in law (thinning), and does not look through all bonds each time.
+
+    Parameters
+    ----------
+    centre, turn : (N, 3), (N, 3, 3)
+        Where the cells are.
+    factor : (K,)
+        On each kind's on-rate, from the slip.
+
+    Returns
+    -------
+    total
+        The sum, of all where `stop` is infinite.
+    which
+        At which bond (counted from 0), or candidate (counted on after the bonds), the sum exceeded `stop`.
+    within
+        By how much it then exceeds.
+    """
+    # taken out of their tuples here, since doing so costs a hundred sums
+    molecules, species, densities, tips = system.molecules, system.species, system.densities, system.bodies.wall_tips
+    total = 0.0
+    first, count = bonds.first[cell], bonds.count[cell]
+    for bond in range(first, first + count):
+        kind = bonds.species[bond]
+        length = bond_length(bond, cell, centre, turn, bonds, molecules)
+        total += _leaving_rate(kind, bonds.state[bond], length, species)
+        if total > stop:
+            return total, bond - first, total - stop
+    first = listed.first[cell]
+    site_of, kind_of, to_x, to_y = listed.site, listed.species, listed.x, listed.y
+    pairwise, reach, least = species.pairwise, species.reach, species.least_length
+    place, turned = centre[cell], turn[cell]
+    for candidate in range(first, first + listed.count[cell]):
+        site = site_of[candidate]
+        if bound[site]:
+            continue
+        kind = kind_of[candidate]
+        x, y, z = place_of(site, place, turned, molecules)
+        pair = pairwise[kind] != 0
+        lateral = math.sqrt((x - to_x[candidate]) ** 2 + (y - to_y[candidate]) ** 2)
+        length = _birth_length(pair, lateral, z - tips, reach[kind], least[kind])
+        if length == math.inf:
+            continue
+        crowd = 1.0 if pair else density_at(densities, cell, kind, x, y)
+        total += crowd * factor[kind] * _forming_rate(kind, length, species)
+        if total > stop:
+            return total, count + candidate - first, total - stop
+    return total, -1, 0.0
 
 
 @compiled
-def length_of(bond: int, bonds: Bonds, molecules: Molecules, motion: Motion, turns: Array) -> float:
-    """Give the length of a bond."""
-    cell = bonds.cell[bond]
-    x, y, z = place_of(bonds.site[bond], cell, molecules, motion, turns[cell])
-    anchor = bonds.anchor[bond]
-    return math.sqrt((x - anchor[0]) ** 2 + (y - anchor[1]) ** 2 + (z - anchor[2]) ** 2)
-
-
-@compiled
-def record(
-    events: Array, count: Indices, kind: int, bond: int, bonds: Bonds, molecules: Molecules, species: Species,
-    length: float, step: int,
+def _record(
+    kind: int, bond: int, cell: int, length: float, step: int, time: float, system: System, bonds: Bonds,
+    progress: Progress, events: Array,
 ) -> None:  # fmt: skip
-    """Append an event; its time is filled in by the caller, who knows the clock."""
-    event = events[count[0]]
+    """Append an event at a time since the burst began."""
+    event = events[progress.events[0]]
+    partner = bonds.partner[bond]
+    ligand = bonds.ligand[bond]
+    table = system.species.first[bonds.species[bond]] + bonds.state[bond]
     event.step = step
+    event.time = time
     event.kind = kind
     event.species = bonds.species[bond]
-    event.state = 0
-    event.cell = bonds.cell[bond]
-    event.partner = -1
-    event.receptor = bonds.site[bond] - molecules.first[bonds.cell[bond]]
-    event.ligand = bonds.ligand[bond]
+    event.state = bonds.state[bond]
+    event.cell = cell
+    event.receptor = bonds.site[bond] - system.molecules.first[cell]
+    event.partner = partner
+    event.ligand = ligand if partner < 0 else ligand - system.molecules.first[partner]
     event.anchor_x = bonds.anchor[bond, 0]
     event.anchor_y = bonds.anchor[bond, 1]
     event.length = length
-    event.force = value(species.tables, bonds.species[bond], TENSION, length)
-    count[0] += 1
+    event.force = value(system.species.tables, table, TENSION, length)
+    progress.events[0] += 1
 
 
 @compiled
-def break_bonds(
-    bonds: Bonds, bound: Flags, system: System, motion: Motion, turns: Array, dice: Dice, step: int, dt: float,
-    events: Array, event_count: Indices,
-) -> None:  # fmt: skip
-    """Test every living bond for rupture; those that stay keep their order."""
-    molecules, species = system.molecules, system.species
-    kept = 0
-    for bond in range(bonds.living[0]):
-        kind = bonds.species[bond]
-        length = length_of(bond, bonds, molecules, motion, turns)
-        chance = -math.expm1(-value(species.tables, kind, OFF_RATE, length) * dt)
-        who = mixed(molecules.owner[bonds.cell[bond]], bonds.site[bond] - molecules.first[bonds.cell[bond]])
-        if uniform(dice.key, _RUPTURE, who, step) < chance:
-            record(events, event_count, 1, bond, bonds, molecules, species, length, step)
-            bound[bonds.site[bond]] = 0
-            continue
-        bonds.cell[kept] = bonds.cell[bond]
-        bonds.site[kept] = bonds.site[bond]
-        bonds.species[kept] = kind
-        bonds.ligand[kept] = bonds.ligand[bond]
-        bonds.anchor[kept] = bonds.anchor[bond]
-        kept += 1
-    bonds.living[0] = kept
+def _drop(bond: int, cell: int, bonds: Bonds, bound: Flags) -> None:
+    """Take a bond out of its cell's; the others keep their order."""
+    bound[bonds.site[bond]] = 0
+    if bonds.partner[bond] >= 0:
+        bound[bonds.ligand[bond]] = 0
+    last = bonds.first[cell] + bonds.count[cell] - 1
+    for b in range(bond, last):
+        bonds.site[b] = bonds.site[b + 1]
+        bonds.species[b] = bonds.species[b + 1]
+        bonds.state[b] = bonds.state[b + 1]
+        bonds.partner[b] = bonds.partner[b + 1]
+        bonds.ligand[b] = bonds.ligand[b + 1]
+        for a in range(3):
+            bonds.anchor[b, a] = bonds.anchor[b + 1, a]
+    bonds.count[cell] -= 1
 
 
 @compiled
-def _bind(bonds: Bonds, cell: int, site: int, kind: int, ligand: int, x: float, y: float, z: float) -> int:
-    """Append a bond; give its index."""
-    bond = int(bonds.living[0])
-    bonds.cell[bond] = cell
-    bonds.site[bond] = site
-    bonds.species[bond] = kind
-    bonds.ligand[bond] = ligand
-    bonds.anchor[bond, 0] = x
-    bonds.anchor[bond, 1] = y
-    bonds.anchor[bond, 2] = z
-    bonds.living[0] = bond + 1
+def _bind(
+    candidate: int, cell: int, angle: float, centre: Array, turn: Array, system: System, bonds: Bonds, bound: Flags,
+    listed: Candidates,
+) -> int:  # fmt: skip
+    """Make a candidate a bond of inner state 0; give it.
+
+    Where the wall's molecules are a density the anchor lies straight below the molecule, or, where bonds are never
+    slack and the gap is smaller than the unstressed length, so far away at `angle` that the bond is unstressed.
+    """
+    bond = bonds.first[cell] + bonds.count[cell]
+    site, kind = listed.site[candidate], listed.species[candidate]
+    tips = system.bodies.wall_tips
+    bonds.site[bond], bonds.species[bond], bonds.state[bond] = site, kind, 0
+    bonds.partner[bond], bonds.ligand[bond] = listed.partner[candidate], listed.ligand[candidate]
+    x, y, z = place_of(site, centre[cell], turn[cell], system.molecules)
+    if system.species.pairwise[kind]:
+        x, y = listed.x[candidate], listed.y[candidate]
+    else:
+        lateral = math.sqrt(max(system.species.least_length[kind] ** 2 - (z - tips) ** 2, 0.0))
+        x, y = x + lateral * math.cos(angle), y + lateral * math.sin(angle)
+    bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2] = x, y, tips
+    bonds.count[cell] += 1
+    bound[site] = 1
     return bond
 
 
 @compiled
-def _bind_anywhere(
-    cell: int, site: int, kind: int, x: float, y: float, gap: float, density_ratio: float, wall_tips: float,
-    species: Species, bonds: Bonds, who: int, dice: Dice, step: int, dt: float,
-) -> int:  # fmt: skip
-    """Test a molecule against a wall whose molecules are a density; give the new bond or -1.
+def _changed(bond: int, length: float, excess: float, system: System, bonds: Bonds) -> int:
+    """Give the inner state that a bond changes to, or -1 if it breaks.
 
-    The bond is born as long as the tip gap, its anchor straight below the molecule, or, where bonds are never slack
-    and the gap is smaller than the unstressed length, unstressed and tilted in a random direction.
+    `excess` lies in what the sum of its rates is, counted back from the last.
     """
-    length = max(abs(gap), species.least_length[kind])
-    rate = density_ratio * value(species.tables, kind, ON_RATE, length)
-    if uniform(dice.key, _FORMATION, mixed(who, kind), step) >= -math.expm1(-rate * dt):
-        return -1
-    lateral = math.sqrt(max(length * length - gap * gap, 0.0))
-    angle = 2 * math.pi * uniform(dice.key, _ANCHORS, mixed(who, kind), step)
-    return _bind(bonds, cell, site, kind, -1, x + lateral * math.cos(angle), y + lateral * math.sin(angle), wall_tips)
-
-
-@compiled
-def _square_of(i: int, j: int) -> int:
-    """Give the identity of a square of the wall; its last eight bits are free for the molecule's number."""
-    return int((np.int64(i) & 0xFFFFFF) << 32 | (np.int64(j) & 0xFFFFFF) << 8)
-
-
-@compiled
-def ligands_of(key: int, kind: int, i: int, j: int, density: float) -> int:
-    """Give the number of the wall's molecules in a square: Poisson, by inversion."""
-    u = uniform(key, _LIGANDS, mixed(_square_of(i, j), kind), 0)
-    chance = math.exp(-density * SQUARE * SQUARE)
-    total = chance
-    number = 0
-    while u > total and number < MOST_LIGANDS:
-        number += 1
-        chance *= density * SQUARE * SQUARE / number
-        total += chance
-    return number
-
-
-@compiled
-def _is_taken(bonds: Bonds, kind: int, ligand: int) -> bool:
-    taken = False
-    for bond in range(bonds.living[0]):
-        taken = taken or (bonds.ligand[bond] == ligand and bonds.species[bond] == kind)
-    return taken
-
-
-@compiled
-def _bind_pairs(
-    cell: int, site: int, kind: int, x: float, y: float, gap: float, density_ratio: float, wall_tips: float,
-    species: Species, bonds: Bonds, who: int, dice: Dice, step: int, dt: float,
-) -> int:  # fmt: skip
-    """Test a molecule against each single molecule of the wall within reach; give the new bond or -1."""
-    reach = species.reach[kind]
-    lateral = math.sqrt(max(reach * reach - gap * gap, 0.0))
-    for i in range(math.floor((x - lateral) / SQUARE), math.floor((x + lateral) / SQUARE) + 1):
-        for j in range(math.floor((y - lateral) / SQUARE), math.floor((y + lateral) / SQUARE) + 1):
-            number = ligands_of(dice.key, kind, i, j, species.ligand_density[kind])
-            square = _square_of(i, j)
-            for k in range(number):
-                u, v = uniform_pair(dice.key, _LIGANDS, mixed(square, kind), 1 + k)
-                lx, ly = (i + u) * SQUARE, (j + v) * SQUARE
-                length = math.sqrt((x - lx) ** 2 + (y - ly) ** 2 + gap * gap)
-                ligand = square | k
-                mark = uniform(dice.key, _LIGANDS, mixed(ligand, kind), 1000)  # thins the densest to the local density
-                if length > reach or mark >= density_ratio:
-                    continue
-                rate = value(species.tables, kind, ON_RATE, length)
-                draw = uniform(dice.key, _FORMATION, mixed(mixed(who, kind), ligand), step)
-                if draw < -math.expm1(-rate * dt) and not _is_taken(bonds, kind, ligand):
-                    return _bind(bonds, cell, site, kind, ligand, lx, ly, wall_tips)
+    kind, state = bonds.species[bond], bonds.state[bond]
+    table = system.species.first[kind] + state
+    for to in range(system.species.first[kind + 1] - system.species.first[kind] - 1, -1, -1):
+        if to != state:
+            excess -= value(system.species.tables, table, EXCHANGE + to, length)
+            if excess <= 0:
+                return to
     return -1
 
 
 @compiled
-def form_bonds(
-    candidates: Indices, first: Indices, bonds: Bonds, bound: Flags, system: System, motion: Motion, turns: Array,
-    dice: Dice, step: int, dt: float, events: Array, event_count: Indices,
+def _born_state(kind: int, length: float, share: float, system: System) -> int:
+    """Give the inner state that a new bond has, for a share of the sum of the rates into all of them."""
+    first, last = system.species.first[kind], system.species.first[kind + 1] - 1
+    total = 0.0
+    for table in range(first, last + 1):
+        total += value(system.species.tables, table, ON_RATE, length)
+    short = share * total
+    for table in range(first, last):
+        short -= value(system.species.tables, table, ON_RATE, length)
+        if short < 0:
+            return table - first
+    return last - first
+
+
+@compiled
+def happen(
+    cell: int, which: int, excess: float, step: int, time: float, centre: Array, turn: Array, key: Word,
+    system: System, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
 ) -> None:  # fmt: skip
-    """Test every free candidate for formation, in the order of the molecules; a new bond is not tested for rupture."""
-    molecules, species, tips = system.molecules, system.species, system.bodies.wall_tips
-    for cell in range(first.shape[0] - 1):
-        for c in range(first[cell], first[cell + 1]):
-            site = candidates[c]
-            if bound[site]:
-                continue
-            x, y, z = place_of(site, cell, molecules, motion, turns[cell])
-            gap = z - tips
-            who = mixed(molecules.owner[cell], site - molecules.first[cell])
-            for kind in range(species.site_kind.shape[0]):
-                if molecules.kind[site] != species.site_kind[kind] or gap > species.reach[kind]:
-                    continue
-                ratio = system.density_ratio[cell, kind]
-                if species.pairwise[kind]:
-                    bond = _bind_pairs(cell, site, kind, x, y, gap, ratio, tips, species, bonds, who, dice, step, dt)
-                else:
-                    bond = _bind_anywhere(cell, site, kind, x, y, gap, ratio, tips, species, bonds, who, dice, step, dt)
-                if bond >= 0:
-                    bound[site] = 1
-                    length = length_of(bond, bonds, molecules, motion, turns)
-                    record(events, event_count, 0, bond, bonds, molecules, species, length, step)
-                    break
+    """Let the event happen that `rates` stopped at, and record it; nothing where a molecule of the wall is bound already."""
+    count = bonds.count[cell]
+    if which >= count:
+        candidate = listed.first[cell] + which - count
+        kind = listed.species[candidate]
+        if listed.ligand[candidate] >= 0 and _is_taken(kind, listed.ligand[candidate], bonds):
+            return
+        who = mixed(system.molecules.owner[cell], clocks.count[cell])
+        bond = _bind(
+            candidate, cell, 2 * math.pi * uniform(key, _ANCHORS, who, 0), centre, turn, system, bonds, bound, listed
+        )
+        length = bond_length(bond, cell, centre, turn, bonds, system.molecules)
+        bonds.state[bond] = _born_state(kind, length, uniform(key, _ANCHORS, who, 1), system)
+        _record(FORMED, bond, cell, length, step, time, system, bonds, progress, events)
+        return
+    bond = bonds.first[cell] + which
+    length = bond_length(bond, cell, centre, turn, bonds, system.molecules)
+    to = _changed(bond, length, excess, system, bonds)
+    if to >= 0:
+        bonds.state[bond] = to
+        _record(CHANGED, bond, cell, length, step, time, system, bonds, progress, events)
+    else:
+        _record(BROKEN, bond, cell, length, step, time, system, bonds, progress, events)
+        _drop(bond, cell, bonds, bound)
+
+
+@compiled
+def slip_factors(cell: int, velocity: Array, gap: float, system: System, out: Array) -> None:
+    """Write the factors (K,) that a cell's slip past the wall puts on its on-rates; `velocity` (6,)."""
+    species, lever = system.species, system.bodies.radius[cell] + gap
+    slip_x = velocity[0] - lever * velocity[4]
+    slip_y = velocity[1] + lever * velocity[3]
+    for kind in range(out.shape[0]):
+        out[kind] = 1.0
+        if species.encounter[kind] >= 0:
+            out[kind] = value(species.encounters, species.encounter[kind], 0, math.sqrt(slip_x**2 + slip_y**2))

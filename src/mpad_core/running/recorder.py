@@ -70,7 +70,7 @@ class Recorder:
     def finish(self, state: State) -> None:
         """Record the last state, unless it has just been recorded."""
         if state.time > self.schedule.last_time:
-            self.record(frame_of(self.problem, self.hazards, state, state, 1.0))
+            self.record(frame_of(self.problem, self.hazards, state))
             self.writer.flush()
 
     def keep(self, state: State, ended: str = "") -> None:
@@ -125,7 +125,7 @@ def begin_recording(recording: Recording, machine: Machine, directory: Path, sta
         schedule=Schedule.starting(recording.cadence, problem, state),
         writer=TrajectoryWriter.create(path, _header(recording, problem), declared),
     )
-    recorder.record(frame_of(problem, recorder.hazards, state, state, 1.0))
+    recorder.record(frame_of(problem, recorder.hazards, state))
     recorder.writer.append_events(_bonds_at_zero(machine, state))
     recorder.writer.flush()
     recorder.keep(state)
@@ -166,8 +166,10 @@ def _header(recording: Recording, problem: Problem) -> TrajectoryHeader:
 def _bonds_at_zero(machine: Machine, state: State) -> Any:
     """List the bonds that a preparation left, as formed at time zero, so that the table of events is complete."""
     bonds, events = state.bonds, np.zeros(len(state.bonds), BOND_EVENT)
-    events["cell"], events["species"], events["ligand"] = bonds.cell, bonds.species, bonds.ligand
-    events["partner"] = -1
+    own = machine.fixed.molecules.first[np.maximum(bonds.partner, 0)]
+    events["cell"], events["species"] = bonds.cell, bonds.species
+    events["ligand"] = np.where(bonds.partner < 0, bonds.ligand, bonds.ligand - own)
+    events["partner"], events["state"] = bonds.partner, bonds.state
     events["receptor"] = bonds.site - machine.fixed.molecules.first[bonds.cell]
     events["anchor_x"], events["anchor_y"] = bonds.anchor[:, 0], bonds.anchor[:, 1]
     events["length"], events["force"] = machine.lengths_and_tensions(state)

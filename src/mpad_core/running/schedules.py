@@ -11,7 +11,7 @@ from attrs import define, frozen
 
 from mpad_core.physics.measures import dx_of
 from mpad_core.physics.problem import Problem
-from mpad_core.physics.state import State
+from mpad_core.physics.state import State, Waypoint
 
 
 @frozen(kw_only=True)
@@ -36,8 +36,8 @@ class Schedule:
         """Begin with a frame at this state."""
         return cls(cadence, state.time, float(dx_of(problem, state.centres)[cadence.cell]))
 
-    def due(self, problem: Problem, before: State, after: State) -> Iterator[float]:
-        """Yield the shares (0, 1] of the way from one state to the next at which a frame is due."""
+    def due(self, problem: Problem, before: State | Waypoint, after: State | Waypoint) -> Iterator[float]:
+        """Yield the shares (0, 1] of the way from one place to the next at which a frame is due."""
         x0, x1 = (float(dx_of(problem, state.centres)[self.cadence.cell]) for state in (before, after))
         span = after.time - before.time
         while True:

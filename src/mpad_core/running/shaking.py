@@ -31,7 +31,7 @@ from mpad_core.numerics.streams import Stream, Word, mixed, normal_pair
 from mpad_core.running.layout import System
 from mpad_core.running.resisting import is_positive_definite, resistance
 
-TICKS = 1 << 16  # a sub-step is never split finer
+TICKS = 1 << 30  # a sub-step is never split finer, and events fall on these: 1 ps of 1 ms
 GAP_SHARE = 0.2  # of the gap to the wall that one sub-step may cross
 SHAKEN_SHARE = 0.5  # the same where there is thermal motion
 RMS_SHARE = 0.1  # of the gap that thermal motion crosses in one part, root mean square

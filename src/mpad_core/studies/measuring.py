@@ -29,7 +29,7 @@ def cost_lines(scene: Scene) -> Iterator[str]:
         solves.append(solved - began)
         sub_steps.append(following.step - state.step)
         state = following
-    lasting = float(np.median(sub_steps)) * machine.pace.sub_step
+    lasting = float(np.median(sub_steps)) * machine.pace.grain
     yield "cost:"
     yield f"  sub-step     {machine.pace.sub_step:.3g} s, {np.median(sub_steps):g} of them in an outer step"
     yield f"  outer step   {1e3 * np.median(whole):.3g} ms, of which coupling {1e3 * np.median(solves):.3g} ms"

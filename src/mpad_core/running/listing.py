@@ -1,0 +1,177 @@
+"""Which molecules may take part in events: lists that are longer than need be, and stand until they could be too short.
+
+Two lists a cell: of all its molecules those near the wall, and of those the candidates, which could bind to the wall
+within a short way. Each is made anew when molecules may have come nearer by more than it allows for; what is listed in
+vain has a rate of zero, so nothing depends on when that is.
+"""
+
+import math
+
+from mpad_core.arrays import Array
+from mpad_core.numerics.compiled import compiled
+from mpad_core.running.densities import density_at
+from mpad_core.running.layout import Candidates, Dice, Motion, System, Work
+from mpad_core.running.places import SQUARE, height_of, ligand_at, ligands_of, place_of
+
+NEAR_MARGIN = 0.3  # µm: molecules this far out of reach are near
+MARGIN = 0.02  # µm: and these are candidates
+_NEAR, _FIRST = 1, 0  # levels of the two lists
+
+
+@compiled
+def reach_height(system: System) -> float:
+    """Give the height below which a molecule can bind to the wall."""
+    reach = -math.inf
+    for kind in range(system.species.reach.shape[0]):
+        if system.species.partner_kind[kind] < 0:
+            reach = max(reach, system.species.reach[kind])
+    return system.bodies.wall_tips + reach
+
+
+@compiled
+def _nearer(cell: int, level: int, centre: Array, rotation: Array, system: System, listed: Candidates) -> float:
+    """Give how much nearer to the wall, or to its molecules, any of a cell's may have come since they were listed.
+
+    The cell is at centre[cell], and has turned as much as motion.turn, rotation[cell], says.
+    """
+    tx = rotation[cell, 0] - listed.turn[cell, level, 0]
+    ty = rotation[cell, 1] - listed.turn[cell, level, 1]
+    tz = rotation[cell, 2] - listed.turn[cell, level, 2]
+    lever = listed.lever[cell, level]
+    drop = max(listed.centre[cell, level, 2] - centre[cell, 2], 0.0)
+    nearer = drop + math.sqrt(tx * tx + ty * ty) * lever
+    if level == _FIRST and system.species.pairwise.any():
+        shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
+        slip_x = centre[cell, 0] - listed.centre[cell, level, 0] - shell * ty
+        slip_y = centre[cell, 1] - listed.centre[cell, level, 1] + shell * tx
+        nearer += math.sqrt(slip_x * slip_x + slip_y * slip_y) + abs(tz) * lever
+    return nearer
+
+
+@compiled
+def _mark(
+    cell: int, level: int, slack: float, highest: float, system: System, motion: Motion, listed: Candidates
+) -> None:
+    """Note where a cell was when its molecules below a height were listed, and how much nearer others may come."""
+    shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
+    depth = min(max(highest - motion.centre[cell, 2] + shell, 0.0), shell)
+    listed.lever[cell, level] = math.sqrt(depth * (2 * shell - depth)) + slack
+    listed.slack[cell, level] = slack
+    for a in range(3):
+        listed.centre[cell, level, a] = motion.centre[cell, a]
+        listed.turn[cell, level, a] = motion.turn[cell, a]
+
+
+@compiled
+def _list_near(cell: int, lowest: float, system: System, motion: Motion, turn: Array, listed: Candidates) -> None:
+    """List a cell's molecules that are within reach of the wall or `NEAR_MARGIN` more."""
+    shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
+    bottom = motion.centre[cell, 2] - shell
+    highest = lowest + NEAR_MARGIN
+    _mark(cell, _NEAR, max(NEAR_MARGIN, bottom - lowest) - MARGIN, highest, system, motion, listed)
+    at = listed.near_first[cell]
+    if bottom < highest:
+        for site in range(system.molecules.first[cell], system.molecules.first[cell + 1]):
+            if height_of(site, motion.centre[cell], turn, system.molecules) < highest:
+                listed.near[at] = site
+                at += 1
+    listed.near_count[cell] = at - listed.near_first[cell]
+
+
+@compiled
+def _append(cell: int, site: int, kind: int, ligand: int, partner: int, x: float, y: float, listed: Candidates) -> bool:
+    """Add a candidate; tell whether there was room."""
+    at = listed.first[cell] + listed.count[cell]
+    if at >= listed.first[cell + 1]:
+        return False
+    listed.site[at] = site
+    listed.species[at] = kind
+    listed.ligand[at] = ligand
+    listed.partner[at] = partner
+    listed.x[at] = x
+    listed.y[at] = y
+    listed.count[cell] += 1
+    return True
+
+
+@compiled
+def _add_ligands(
+    cell: int, site: int, kind: int, x: float, y: float, gap: float, system: System, dice: Dice, listed: Candidates
+) -> bool:
+    """Add the molecules of the wall that one of a cell's could bind to; tell whether there was room."""
+    reach = system.species.reach[kind] + MARGIN
+    lateral = math.sqrt(max(reach * reach - gap * gap, 0.0))
+    for i in range(math.floor((x - lateral) / SQUARE), math.floor((x + lateral) / SQUARE) + 1):
+        for j in range(math.floor((y - lateral) / SQUARE), math.floor((y + lateral) / SQUARE) + 1):
+            for k in range(ligands_of(dice.key, kind, i, j, system.species.ligand_density[kind])):
+                ligand, lx, ly, mark = ligand_at(dice.key, kind, i, j, k)
+                if (x - lx) ** 2 + (y - ly) ** 2 > lateral * lateral:
+                    continue
+                if mark >= density_at(system.densities, cell, kind, lx, ly):
+                    continue
+                if not _append(cell, site, kind, ligand, -1, lx, ly, listed):
+                    return False
+    return True
+
+
+@compiled
+def _list_candidates(
+    cell: int, lowest: float, system: System, motion: Motion, turn: Array, dice: Dice, listed: Candidates
+) -> bool:
+    """List what a cell's near molecules can bind to, or could after a short way; tell whether there was room."""
+    molecules, species = system.molecules, system.species
+    centre = motion.centre[cell]
+    bottom = centre[2] - system.bodies.radius[cell] - system.bodies.roughness[cell]
+    _mark(cell, _FIRST, max(MARGIN, bottom - lowest), lowest + MARGIN, system, motion, listed)
+    listed.count[cell] = 0
+    first = listed.near_first[cell]
+    for n in range(first, first + listed.near_count[cell]):
+        site = listed.near[n]
+        if height_of(site, centre, turn, molecules) >= lowest + MARGIN:
+            continue
+        x, y, z = place_of(site, centre, turn, molecules)
+        gap = z - system.bodies.wall_tips
+        for kind in range(species.site_kind.shape[0]):
+            if molecules.kind[site] != species.site_kind[kind] or species.partner_kind[kind] >= 0:
+                continue
+            if gap >= species.reach[kind] + MARGIN:
+                continue
+            if species.pairwise[kind]:
+                room = _add_ligands(cell, site, kind, x, y, gap, system, dice, listed)
+            else:
+                room = _append(cell, site, kind, -1, -1, 0.0, 0.0, listed)
+            if not room:
+                return False
+    return True
+
+
+@compiled
+def refresh(cell: int, system: System, motion: Motion, turn: Array, dice: Dice, listed: Candidates) -> bool:
+    """See to it that all molecules of a cell that can bind are listed; tell whether there was room.
+
+    A `near_count` below zero says that nothing has been listed yet.
+    """
+    if system.molecules.first[cell] == system.molecules.first[cell + 1]:
+        listed.near_count[cell] = 0
+        listed.slack[cell] = math.inf
+        return True
+    lowest = reach_height(system)
+    centre, rotation = motion.centre, motion.turn
+    if (
+        listed.near_count[cell] < 0
+        or _nearer(cell, _NEAR, centre, rotation, system, listed) > listed.slack[cell, _NEAR]
+    ):
+        _list_near(cell, lowest, system, motion, turn, listed)
+    elif not _nearer(cell, _FIRST, centre, rotation, system, listed) > listed.slack[cell, _FIRST]:
+        return True
+    return _list_candidates(cell, lowest, system, motion, turn, dice, listed)
+
+
+@compiled
+def reaches_out(cell: int, system: System, motion: Motion, work: Work, listed: Candidates) -> int:
+    """Tell whether the way that is tried leads a cell beyond its list: 0 no, 1 a new list would do, 2 it is too long."""
+    slack = listed.slack[cell, _FIRST]
+    if not _nearer(cell, _FIRST, work.centre, work.rotation, system, listed) > slack:
+        return 0
+    way = _nearer(cell, _FIRST, motion.centre, motion.turn, system, listed)
+    return 1 if way > 0 else 2
