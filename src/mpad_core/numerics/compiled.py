@@ -105,12 +105,20 @@ def compiled_sums(function: Callable[P, R]) -> Callable[P, R]:
     return kernel
 
 
-def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile as `compiled` does, and put the code wherever it is called.
+def compiled_lean(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `compiled` does, without reference counts: for functions that make no array and keep none.
 
-    For what inner loops call: a call hands over each array of a named tuple one by one, at the price of a hundred sums.
+    To take an array out of a named tuple otherwise costs two atomic sums for each array of that tuple, which in small
+    functions is most of the time.
     """
-    inlined = numba.njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
+    lean = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
+    kernel: Callable[P, R] = _forgiving(lean(function))
+    return kernel
+
+
+def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile as `compiled_lean` does, and put the code wherever it is called: for what inner loops call."""
+    inlined = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False, forceinline=True)
     kernel: Callable[P, R] = _forgiving(inlined(function))
     return kernel
 

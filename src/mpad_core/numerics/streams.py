@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled_lean
 
 
 class Stream(IntEnum):
@@ -44,7 +44,7 @@ def key_of(seed: int, replicate: int = 0) -> np.uint64:
     return np.uint64(np.random.SeedSequence(seed, spawn_key=(replicate,)).generate_state(1, np.uint64)[0])
 
 
-@compiled
+@compiled_lean
 def philox(c0: Word, c1: Word, c2: Word, c3: Word, key: Word) -> tuple[Word, Word, Word, Word]:
     """Apply the ten rounds of Philox4x32 to a counter of four 32-bit words, held in uint64."""
     k0 = key & _MASK
@@ -63,7 +63,7 @@ def philox(c0: Word, c1: Word, c2: Word, c3: Word, key: Word) -> tuple[Word, Wor
     return c0, c1, c2, c3
 
 
-@compiled
+@compiled_lean
 def uniform_pair(key: Word, stream: int, identity: Word, step: int) -> tuple[float, float]:
     """Draw two uniform numbers in (0, 1), never 0 or 1, of 52 bits each.
 
@@ -87,13 +87,13 @@ def uniform_pair(key: Word, stream: int, identity: Word, step: int) -> tuple[flo
     return (first + 0.5) / 4503599627370496.0, (second + 0.5) / 4503599627370496.0
 
 
-@compiled
+@compiled_lean
 def uniform(key: Word, stream: int, identity: Word, step: int) -> float:
     """Draw one uniform number in (0, 1); see `uniform_pair`."""
     return uniform_pair(key, stream, identity, step)[0]
 
 
-@compiled
+@compiled_lean
 def normal_pair(key: Word, stream: int, identity: Word, step: int) -> tuple[float, float]:
     """Draw two independent standard normal numbers by the method of Box and Muller; arguments as `uniform_pair`."""
     first, second = uniform_pair(key, stream, identity, step)
@@ -101,7 +101,7 @@ def normal_pair(key: Word, stream: int, identity: Word, step: int) -> tuple[floa
     return radius * math.cos(angle), radius * math.sin(angle)
 
 
-@compiled
+@compiled_lean
 def mixed(first: Word, second: Word) -> Word:
     """Make one 64-bit identity of two: the finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014) over both."""
     z = np.uint64(first) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(second)
@@ -110,7 +110,7 @@ def mixed(first: Word, second: Word) -> Word:
     return z ^ (z >> np.uint64(31))
 
 
-@compiled
+@compiled_lean
 def fill_uniform(key: Word, stream: int, identity: Word, first: int, out: Array) -> None:
     """Fill (n, 2) with the pairs of steps `first`, `first` + 1, …"""
     for i in range(out.shape[0]):

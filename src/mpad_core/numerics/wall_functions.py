@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mpad_core.numerics import _wall_table
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled, compiled_lean
 from mpad_core.numerics.wall_series import NAMES
 
 Array = npt.NDArray[np.float64]
@@ -49,7 +49,7 @@ __all__ = [
 ]
 
 
-@compiled
+@compiled_lean
 def _near(eps: float, out: Array) -> None:
     logarithm = log(1.0 / eps)
     out[:] = 0.0
@@ -59,7 +59,7 @@ def _near(eps: float, out: Array) -> None:
     out[FPERP] /= eps
 
 
-@compiled
+@compiled_lean
 def _middle(eps: float, out: Array) -> None:
     mantissa, exponent = frexp(eps)
     octave = OCTAVES - 1 + exponent
@@ -71,7 +71,7 @@ def _middle(eps: float, out: Array) -> None:
     out[FPERP] /= eps
 
 
-@compiled
+@compiled_lean
 def _far(eps: float, out: Array) -> None:
     x = 1.0 / (1.0 + eps)
     t = 4.0 * x - 1.0
@@ -89,7 +89,7 @@ def _far(eps: float, out: Array) -> None:
     out[TSHEAR] = 1.0 + cube * out[TSHEAR]
 
 
-@compiled
+@compiled_lean
 def wall_functions(eps: float, out: Array) -> None:
     """Look the eight functions up, to about 1e-12 of each.
 
@@ -241,6 +241,34 @@ def wall_shear_load(height: float, gap: float, radius: float, viscosity: float, 
     out[:] = 0.0
     out[0] = 6.0 * np.pi * viscosity * radius * height * shear_rate * f[FSHEAR]
     out[4] = 4.0 * np.pi * viscosity * radius**3 * shear_rate * f[TSHEAR]
+
+
+@compiled_lean
+def add_wall_resistance(
+    o: int, height: float, gap: float, radius: float, viscosity: float, shear_rate: float, functions: Array,
+    resistance: Array, load: Array,
+) -> None:  # fmt: skip
+    """Add what `wall_resistance` and `wall_shear_load` give, by one look-up, to larger matrices from place `o` on.
+
+    `functions` (8,) is overwritten.
+    """
+    f = functions
+    wall_functions(gap / radius, f)
+    force = 6.0 * np.pi * viscosity * radius
+    torque = 8.0 * np.pi * viscosity * radius**3
+    cross = 6.0 * np.pi * viscosity * radius**2 * f[FROT]
+    resistance[o, o] += force * f[FPAR]
+    resistance[o + 1, o + 1] += force * f[FPAR]
+    resistance[o + 2, o + 2] += force * f[FPERP]
+    resistance[o + 3, o + 3] += torque * f[TROT]
+    resistance[o + 4, o + 4] += torque * f[TROT]
+    resistance[o + 5, o + 5] += torque * f[TSPIN]
+    resistance[o, o + 4] -= cross
+    resistance[o + 4, o] -= cross
+    resistance[o + 1, o + 3] += cross
+    resistance[o + 3, o + 1] += cross
+    load[o] += force * height * shear_rate * f[FSHEAR]
+    load[o + 4] += 0.5 * torque * shear_rate * f[TSHEAR]
 
 
 @compiled

@@ -32,6 +32,7 @@ from mpad_core.running.layout import (
     Trail,
 )
 from mpad_core.running.places import MOST_LIGANDS, SQUARE
+from mpad_core.running.reacting import list_bridges
 from mpad_core.running.shaking import TICKS
 
 _MOST_NOTED = 20_000  # places of cells on the way of one burst
@@ -222,6 +223,8 @@ def room_for(fixed: Fixed, bonds: BondList, cells: int, times: int = 1) -> Room:
     places = first[bonds.cell] + np.arange(len(bonds)) - (np.cumsum(counts) - counts)[bonds.cell]
     for name in _BOND_FIELDS:
         getattr(laid, name)[places] = getattr(bonds, name)
+    for cell in np.flatnonzero(np.bincount(bonds.cell[bonds.partner >= 0], minlength=cells)):
+        list_bridges(cell, laid)
     bound = np.zeros(len(fixed.molecules.kind), np.uint8)
     bound[bonds.site] = 1
     bound[bonds.ligand[bonds.partner >= 0]] = 1
@@ -231,9 +234,9 @@ def room_for(fixed: Fixed, bonds: BondList, cells: int, times: int = 1) -> Room:
 
 def _no_bonds(first: Indices, counts: Indices) -> Bonds:
     room = int(first[-1])
-    site, species, state, partner, ligand = np.zeros((5, room), np.int64)
-    vectors = (np.zeros((room, 3)) for _ in range(3))
-    return Bonds(first, counts, site, species, state, partner, ligand, *vectors)
+    site, species, state, partner, ligand, bridge = np.zeros((6, room), np.int64)
+    anchor = np.zeros((room, 3))
+    return Bonds(first, counts, site, species, state, partner, ligand, anchor, np.zeros_like(counts), bridge)
 
 
 def _candidates(fixed: Fixed, times: int) -> Candidates:

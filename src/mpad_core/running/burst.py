@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from mpad_core.arrays import Array, Flags
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled, compiled_lean
 from mpad_core.numerics.streams import Word
 from mpad_core.running.clocks import EARLY, LATE, choice, drawn, share_until, used_until
 from mpad_core.running.layout import (
@@ -26,7 +26,7 @@ from mpad_core.running.layout import (
     Work,
 )
 from mpad_core.running.listing import reaches_out, refresh
-from mpad_core.running.moving import advance, attach, commit, refresh_turns, step_explicitly
+from mpad_core.running.moving import advance, commit, refresh_turns, step_explicitly
 from mpad_core.running.reacting import happen, rates, slip_factors
 from mpad_core.running.resisting import is_positive_definite, resistance
 from mpad_core.running.shaking import TICKS, draw, longest_part
@@ -46,13 +46,15 @@ def _work_for(group: int, system: System) -> Work:
     m = 6 * members.shape[0]
     return Work(
         system.bodies.radius[members], np.empty((m, m)), np.empty((m, m)), np.empty(m), np.empty(m), np.empty(m),
-        np.empty(m), np.empty(m), np.empty(m), np.zeros(m), np.empty(cells), np.empty((cells, 3)),
+        np.empty(m), np.empty(m), np.empty(m), np.zeros(m), np.empty(8),
+        np.empty(system.species.site_kind.shape[0]), np.empty(m), np.empty(m), np.empty((2, 3, 6)), np.empty((3, 3)),
+        np.empty(cells), np.empty((cells, 3)),
         np.empty((cells, 4)), np.empty((cells, 3)), np.empty((cells, 3, 3)), np.empty((cells, 3)),
         np.empty((cells, 3, 3)),
     )  # fmt: skip
 
 
-@compiled
+@compiled_lean
 def _between(cell: int, share: float, motion: Motion, turn: Array, work: Work) -> None:
     """Write a cell's place and turn at a share of the way that is being tried."""
     for i in range(3):
@@ -61,7 +63,7 @@ def _between(cell: int, share: float, motion: Motion, turn: Array, work: Work) -
             work.middle_turn[cell, i, j] = turn[cell, i, j] + share * (work.turn[cell, i, j] - turn[cell, i, j])
 
 
-@compiled
+@compiled_lean
 def _look_ahead(
     group: int, dt: float, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, work: Work,
     listed: Candidates, clocks: Clocks, rate: float, ahead: Array,
@@ -77,7 +79,7 @@ def _look_ahead(
     """
     groups = system.groups
     first, whose = 1.0, -1
-    factor = np.empty(system.species.site_kind.shape[0])
+    factor = work.factor
     for k in range(groups.first[group], groups.first[group + 1]):
         cell = groups.cells[k]
         ahead[cell, 0] = ahead[cell, 1] = 0.0
@@ -99,7 +101,7 @@ def _look_ahead(
     return first, whose
 
 
-@compiled
+@compiled_lean
 def _wind(
     group: int, share: float, dt: float, whose: int, system: System, key: Word, clocks: Clocks, ahead: Array
 ) -> None:
@@ -113,16 +115,15 @@ def _wind(
             clocks.left[cell] -= used_until(share, ahead[cell, 0], ahead[cell, 1], dt)
 
 
-@compiled
+@compiled_lean
 def _let_happen(
-    cell: int, velocity: Array, step: int, time: float, key: Word, system: System, bonds: Bonds, bound: Flags,
+    cell: int, velocity: Array, factor: Array, step: int, time: float, key: Word, system: System, bonds: Bonds, bound: Flags,
     motion: Motion, turn: Array, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
 ) -> None:  # fmt: skip
     """Draw which event a cell's clock stands for, from the rates of the moment, and let it happen.
 
     The clock has been wound already, so the draw is the one that belongs to the number before.
     """
-    factor = np.empty(system.species.site_kind.shape[0])
     slip_factors(cell, velocity, motion.gap[cell], system, factor)
     total, _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
     share = choice(key, system.molecules.owner[cell], clocks.count[cell] - 1)
@@ -134,21 +135,20 @@ def _let_happen(
         )  # fmt: skip
 
 
-@compiled
+@compiled_lean
 def _is_ready(
     cell: int, system: System, bonds: Bonds, motion: Motion, turn: Array, dice: Dice, listed: Candidates,
     progress: Progress, events: Array,
 ) -> bool:  # fmt: skip
-    """Bring a cell's lists and its bonds' arms up to date; tell whether there is room for them and for an event."""
+    """Bring a cell's lists up to date; tell whether there is room for them and for an event."""
     if system.species.site_kind.shape[0] == 0:
         return True
     if bonds.first[cell] + bonds.count[cell] >= bonds.first[cell + 1] or progress.events[0] >= events.shape[0]:
         return False
-    attach(cell, turn[cell], system.molecules, bonds)
     return refresh(cell, system, motion, turn[cell], dice, listed)
 
 
-@compiled
+@compiled_lean
 def _strays(group: int, system: System, motion: Motion, work: Work, listed: Candidates) -> int:
     """Tell whether the way that is tried leads beyond what is listed: 1 if new lists would do, 2 if it is too long."""
     stray = 0
@@ -158,7 +158,7 @@ def _strays(group: int, system: System, motion: Motion, work: Work, listed: Cand
     return stray
 
 
-@compiled
+@compiled_lean
 def _move_group(
     group: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits, dice: Dice,
     listed: Candidates, clocks: Clocks, progress: Progress, events: Array, work: Work, ahead: Array,
@@ -178,7 +178,7 @@ def _move_group(
             part = min(part, longest_part(group, limits.sub_step, system.thermal.energy[k], system, motion.gap))
             draw(group, system, dice.key, step, tick, tick + part, limits.sub_step, work.noise)
         dt = limits.sub_step * part / TICKS
-        error = advance(group, dt, system, bonds, motion, work)
+        error = advance(group, dt, system, bonds, motion, turn, work)
         stray = 0 if error == math.inf else _strays(group, system, motion, work, listed)
         if stray == 1:
             for k in range(first, last):
@@ -202,7 +202,7 @@ def _move_group(
             if done < part:
                 for k in range(system.thermal.energy.shape[0]):
                     draw(group, system, dice.key, step, tick, tick + done, limits.sub_step, work.noise)
-                if advance(group, limits.sub_step * done / TICKS, system, bonds, motion, work) == math.inf:
+                if advance(group, limits.sub_step * done / TICKS, system, bonds, motion, turn, work) == math.inf:
                     progress.part[group] = max(done // 2, 1)
                     continue
         _wind(group, abs(share), dt, whose, system, dice.key, clocks, ahead)
@@ -211,7 +211,7 @@ def _move_group(
             place = 6 * system.groups.place[whose]
             time = (tick + share * part) / TICKS
             _let_happen(
-                whose, work.velocity[place : place + 6], step, time, dice.key, system, bonds, bound, motion, turn,
+                whose, work.velocity[place : place + 6], work.factor, step, time, dice.key, system, bonds, bound, motion, turn,
                 listed, clocks, progress, events,
             )  # fmt: skip
         longer = _GROWTH if error <= 0.05 * limits.error or shaken else max(0.9 * math.sqrt(limits.error / error), 0.5)
@@ -220,7 +220,7 @@ def _move_group(
     return REACHED
 
 
-@compiled
+@compiled_lean
 def _move_explicitly(
     group: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits, dice: Dice,
     listed: Candidates, clocks: Clocks, progress: Progress, events: Array, work: Work, ahead: Array,
@@ -231,21 +231,21 @@ def _move_explicitly(
     """
     step = dice.step + progress.beats[0] * dice.stride
     first, last = system.groups.first[group], system.groups.first[group + 1]
-    factor = np.empty(system.species.site_kind.shape[0])
+    factor = work.factor
     steps = max(round(limits.sub_step / limits.euler[0]), 1)
     dt = limits.sub_step / steps
     while progress.tick[group] < TICKS:
         done = progress.part[group] % TICKS  # steps of this sub-step
         for k in range(first, last):
             cell = system.groups.cells[k]
-            if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
-                return ROOM_NEEDED
             if done % _HELD_STEPS == 0 or ahead[cell, 1] < 0:
+                if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
+                    return ROOM_NEEDED
                 slip_factors(cell, motion.velocity[cell], motion.gap[cell], system, factor)
                 ahead[cell, 0], _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
                 ahead[cell, 1] = 0.0
             clocks.left[cell] -= ahead[cell, 0] * dt
-        step_explicitly(group, dt, system, bonds, motion, work)
+        step_explicitly(group, dt, system, bonds, motion, turn, work)
         commit(group, dt, system, motion, turn, work)
         for k in range(first, last):
             cell = system.groups.cells[k]
@@ -253,7 +253,7 @@ def _move_explicitly(
                 clocks.count[cell] += 1
                 clocks.left[cell] = drawn(dice.key, system.molecules.owner[cell], clocks.count[cell])
                 _let_happen(
-                    cell, motion.velocity[cell], step, (done + 1) / steps, dice.key, system, bonds, bound, motion,
+                    cell, motion.velocity[cell], factor, step, (done + 1) / steps, dice.key, system, bonds, bound, motion,
                     turn, listed, clocks, progress, events,
                 )  # fmt: skip
                 ahead[cell, 1] = -1.0
@@ -262,14 +262,13 @@ def _move_explicitly(
     return REACHED
 
 
-@compiled
+@compiled_lean
 def _wait(
-    cell: int, slot: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits,
+    cell: int, slot: int, velocity: Array, factor: Array, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits,
     dice: Dice, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
 ) -> int:  # fmt: skip
     """Let happen what happens to a cell that does not move, up to the end of the sub-step that is under way."""
     step = dice.step + progress.beats[0] * dice.stride
-    factor, velocity = np.empty(system.species.site_kind.shape[0]), np.zeros(6)
     while progress.tick[slot] < TICKS:
         if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
             return ROOM_NEEDED
@@ -286,13 +285,27 @@ def _wait(
         clocks.left[cell] = drawn(dice.key, system.molecules.owner[cell], clocks.count[cell])
         time = (progress.tick[slot] + share * part) / TICKS
         _let_happen(
-            cell, velocity, step, time, dice.key, system, bonds, bound, motion, turn, listed, clocks, progress, events
+            cell,
+            velocity,
+            factor,
+            step,
+            time,
+            dice.key,
+            system,
+            bonds,
+            bound,
+            motion,
+            turn,
+            listed,
+            clocks,
+            progress,
+            events,
         )
         progress.tick[slot] += min(max(math.ceil(share * part), 1), part)
     return REACHED
 
 
-@compiled
+@compiled_lean
 def _must_end(motion: Motion, limits: Limits) -> bool:
     """Tell whether the frozen coupling has been used far enough."""
     start = limits.start
@@ -309,10 +322,10 @@ def _must_end(motion: Motion, limits: Limits) -> bool:
     return False
 
 
-@compiled
+@compiled_lean
 def _fits(group: int, system: System, motion: Motion, work: Work) -> bool:
     """Tell whether a group's frozen coupling fits its heights."""
-    resistance(group, system, motion.gap, work.matrix, work.right)
+    resistance(group, system, motion.gap, work.functions, work.matrix, work.right)
     return is_positive_definite(work.matrix)
 
 
@@ -348,6 +361,7 @@ def burst(
     turn = np.empty((cells, 3, 3))
     refresh_turns(motion, turn)
     ahead = np.zeros((cells, 2))
+    at_rest, factor = np.zeros(6), np.empty(system.species.site_kind.shape[0])
     listed.near_count[:] = -1
     works = [_work_for(group, system) for group in range(groups)]
     while progress.beats[0] < limits.most:
@@ -369,7 +383,7 @@ def burst(
         for cell in range(cells):
             if system.groups.place[cell] < 0:
                 outcome = _wait(
-                    cell, groups + cell, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress,
+                    cell, groups + cell, at_rest, factor, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress,
                     events,
                 )  # fmt: skip
                 if outcome != REACHED:

@@ -8,39 +8,39 @@ where the time of an event is asked for. So nothing depends on how time is cut i
 
 import math
 
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled_lean
 from mpad_core.numerics.streams import Stream, Word, uniform_pair
 
 EARLY, LATE = 0.5 - math.sqrt(1 / 12), 0.5 + math.sqrt(1 / 12)  # the points, as shares of the sub-step
 _CLOCKS = int(Stream.CLOCKS)
 
 
-@compiled
+@compiled_lean
 def drawn(key: Word, owner: Word, count: int) -> float:
     """Draw how much hazard a cell may use up before its event number `count`."""
     return -math.log(uniform_pair(key, _CLOCKS, owner, count)[0])
 
 
-@compiled
+@compiled_lean
 def choice(key: Word, owner: Word, count: int) -> float:
     """Draw, uniformly between 0 and 1, which of all that could happen is event number `count`."""
     return uniform_pair(key, _CLOCKS, owner, count)[1]
 
 
-@compiled
+@compiled_lean
 def used(early: float, late: float, dt: float) -> float:
     """Give the hazard integrated over a sub-step, of the rates at its two points."""
     return 0.5 * (early + late) * dt
 
 
-@compiled
+@compiled_lean
 def used_until(share: float, early: float, late: float, dt: float) -> float:
     """Give the hazard integrated over the first `share` of a sub-step."""
     slope = (late - early) / (LATE - EARLY)
     return max((early + (0.5 * share - EARLY) * slope) * share * dt, 0.0)
 
 
-@compiled
+@compiled_lean
 def share_until(left: float, early: float, late: float, dt: float) -> float:
     """Give the share of a sub-step over which `left` is used up; infinity if more is left than the whole uses."""
     if not used(early, late, dt) >= left:

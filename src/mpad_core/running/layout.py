@@ -59,8 +59,8 @@ class Bonds(NamedTuple):
     partner: Indices  # (B,) the other cell; -1 for the wall
     ligand: Indices  # (B,) the other molecule: index into Molecules, or the wall's identity; -1 where not told apart
     anchor: Array  # (B, 3) µm, where the bond holds the wall; not used between cells
-    arm: Array  # (B, 3) µm, from the cell's centre to the molecule, in space; written by each sub-step
-    other_arm: Array  # (B, 3) µm, the same on the other cell
+    bridges: Indices  # (N,) how many of each cell's bonds are to other cells
+    bridge: Indices  # (B,) which, from the cell's first place on
 
 
 class Contacts(NamedTuple):
@@ -125,6 +125,12 @@ class Work(NamedTuple):
     change: Array  # (m,)
     moved: Array  # (m,)
     noise: Array  # (m,) s^½, increments of the Brownian paths
+    functions: Array  # (8,) of the wall
+    factor: Array  # (K,) on on-rates
+    push: Array  # (m,) and (m,): of thermal motion
+    star: Array
+    levers: Array  # (2, 3, 6) and (3, 3): of a bond between cells
+    ends: Array
     gaps: Array  # (N,) µm; the rest as in Motion, for all cells
     centre: Array  # (N, 3)
     orientation: Array  # (N, 4)

@@ -8,7 +8,7 @@ vain has a rate of zero, so nothing depends on when that is.
 import math
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled_lean
 from mpad_core.running.densities import density_at
 from mpad_core.running.layout import Candidates, Dice, Motion, System, Work
 from mpad_core.running.places import SQUARE, height_of, ligand_at, ligands_of, place_of
@@ -18,7 +18,7 @@ MARGIN = 0.02  # µm: and these are candidates
 _NEAR, _FIRST = 1, 0  # levels of the two lists
 
 
-@compiled
+@compiled_lean
 def reach_height(system: System) -> float:
     """Give the height below which a molecule can bind to the wall."""
     reach = -math.inf
@@ -28,7 +28,7 @@ def reach_height(system: System) -> float:
     return system.bodies.wall_tips + reach
 
 
-@compiled
+@compiled_lean
 def _nearer(cell: int, level: int, centre: Array, rotation: Array, system: System, listed: Candidates) -> float:
     """Give how much nearer to the wall, or to its molecules, any of a cell's may have come since they were listed.
 
@@ -48,7 +48,7 @@ def _nearer(cell: int, level: int, centre: Array, rotation: Array, system: Syste
     return nearer
 
 
-@compiled
+@compiled_lean
 def _mark(
     cell: int, level: int, slack: float, highest: float, system: System, motion: Motion, listed: Candidates
 ) -> None:
@@ -62,7 +62,7 @@ def _mark(
         listed.turn[cell, level, a] = motion.turn[cell, a]
 
 
-@compiled
+@compiled_lean
 def _list_near(cell: int, lowest: float, system: System, motion: Motion, turn: Array, listed: Candidates) -> None:
     """List a cell's molecules that are within reach of the wall or `NEAR_MARGIN` more."""
     shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
@@ -78,7 +78,7 @@ def _list_near(cell: int, lowest: float, system: System, motion: Motion, turn: A
     listed.near_count[cell] = at - listed.near_first[cell]
 
 
-@compiled
+@compiled_lean
 def _append(cell: int, site: int, kind: int, ligand: int, partner: int, x: float, y: float, listed: Candidates) -> bool:
     """Add a candidate; tell whether there was room."""
     at = listed.first[cell] + listed.count[cell]
@@ -94,7 +94,7 @@ def _append(cell: int, site: int, kind: int, ligand: int, partner: int, x: float
     return True
 
 
-@compiled
+@compiled_lean
 def _add_ligands(
     cell: int, site: int, kind: int, x: float, y: float, gap: float, system: System, dice: Dice, listed: Candidates
 ) -> bool:
@@ -114,7 +114,7 @@ def _add_ligands(
     return True
 
 
-@compiled
+@compiled_lean
 def _list_candidates(
     cell: int, lowest: float, system: System, motion: Motion, turn: Array, dice: Dice, listed: Candidates
 ) -> bool:
@@ -145,7 +145,7 @@ def _list_candidates(
     return True
 
 
-@compiled
+@compiled_lean
 def refresh(cell: int, system: System, motion: Motion, turn: Array, dice: Dice, listed: Candidates) -> bool:
     """See to it that all molecules of a cell that can bind are listed; tell whether there was room.
 
@@ -167,7 +167,7 @@ def refresh(cell: int, system: System, motion: Motion, turn: Array, dice: Dice, 
     return _list_candidates(cell, lowest, system, motion, turn, dice, listed)
 
 
-@compiled
+@compiled_lean
 def reaches_out(cell: int, system: System, motion: Motion, work: Work, listed: Candidates) -> int:
     """Tell whether the way that is tried leads a cell beyond its list: 0 no, 1 a new list would do, 2 it is too long."""
     slack = listed.slack[cell, _FIRST]

@@ -15,10 +15,11 @@ import math
 import numpy as np
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled, compiled_inline
+from mpad_core.numerics.compiled import compiled_inline, compiled_lean
 from mpad_core.numerics.rotations import matrix_of, turned, turned_vector
-from mpad_core.numerics.tables import Tables, value_and_slope
-from mpad_core.running.layout import Bonds, Molecules, Motion, Species, System, Work
+from mpad_core.numerics.tables import value_and_slope
+from mpad_core.running.layout import Bonds, Motion, System, Work
+from mpad_core.running.places import place_of
 from mpad_core.running.reacting import TENSION
 from mpad_core.running.resisting import resistance, solve_in_place
 from mpad_core.running.shaking import GAP_SHARE, SHAKEN_SHARE, shake
@@ -31,20 +32,16 @@ _LEAD_SHARE = 0.1  # of the gap to the wall, which the prediction for a sub-step
 
 @compiled_inline
 def _add_bond(
-    arm: Array, dx: float, dy: float, dz: float, table: int, species: Species, load: Array, stiffness: Array
-) -> None:
-    """Add one bond's load on its cell (6,), and minus the load's derivative by displacement and turn (6, 6).
+    o: int, bx: float, by: float, bz: float, dx: float, dy: float, dz: float, length: float, tension: float,
+    slope: float, load: Array, stiffness: Array,
+) -> None:  # fmt: skip
+    """Add one bond's load on a cell whose numbers begin at `o`, and minus the load's derivative by its motion.
 
-    The end on the cell is at `arm` from its centre, and at (dx, dy, dz) from the other end.
-    A bond of tension T along n, whose end is at b from the centre, pulls with F = −T n. The end moves by δx − b × δθ,
-    so with K = (T′ − T/L) n nᵀ + (T/L) 1 and c = b × n the four blocks are K; (T′ − T/L) n cᵀ − (T/L) [b]×; its
-    transpose; and (T′ − T/L) c cᵀ − (T/L) [b]×² + T [n]× [b]×, the last part because the arm turns with the cell.
+    A bond of tension T along n, whose end on the cell is at b from the centre and at d = L n from its other end, pulls
+    with F = −T n. The end moves by δx − b × δθ, so with K = (T′ − T/L) n nᵀ + (T/L) 1 and c = b × n the four blocks are
+    K; (T′ − T/L) n cᵀ − (T/L) [b]×; its transpose; and (T′ − T/L) c cᵀ − (T/L) [b]×² + T [n]× [b]×, the last part
+    because the arm turns with the cell.
     """
-    length = math.sqrt(dx * dx + dy * dy + dz * dz)
-    tension, slope = value_and_slope(species.tables, table, TENSION, length)
-    if (tension == 0.0 and slope == 0.0) or length == 0.0:
-        return
-    bx, by, bz = arm[0], arm[1], arm[2]
     nx, ny, nz = dx / length, dy / length, dz / length
     n = (nx, ny, nz)
     b = (bx, by, bz)
@@ -55,26 +52,49 @@ def _add_bond(
     square = bx * bx + by * by + bz * bz
     level = nx * bx + ny * by + nz * bz
     for i in range(3):
-        load[i] -= tension * n[i]
-        load[3 + i] -= tension * c[i]
-        stiffness[i, i] += side
-        stiffness[3 + i, 3 + i] += side * square - tension * level
+        load[o + i] -= tension * n[i]
+        load[o + 3 + i] -= tension * c[i]
+        stiffness[o + i, o + i] += side
+        stiffness[o + 3 + i, o + 3 + i] += side * square - tension * level
         for j in range(3):
-            stiffness[i, j] += along * n[i] * n[j]
-            stiffness[i, 3 + j] += along * n[i] * c[j] - side * cross[i][j]
-            stiffness[3 + i, j] += along * c[i] * n[j] + side * cross[i][j]
-            stiffness[3 + i, 3 + j] += along * c[i] * c[j] - side * b[i] * b[j] + tension * b[i] * n[j]
+            stiffness[o + i, o + j] += along * n[i] * n[j]
+            stiffness[o + i, o + 3 + j] += along * n[i] * c[j] - side * cross[i][j]
+            stiffness[o + 3 + i, o + j] += along * c[i] * n[j] + side * cross[i][j]
+            stiffness[o + 3 + i, o + 3 + j] += along * c[i] * c[j] - side * b[i] * b[j] + tension * b[i] * n[j]
 
 
-@compiled_inline
-def _add_wall_contact(tip_gap: float, law: Tables, load: Array, stiffness: Array) -> None:
-    """Add the repulsion between a cell's bumps and the wall's."""
-    force, slope = value_and_slope(law, 0, 0, tip_gap)
-    load[2] += force
-    stiffness[2, 2] -= slope
+@compiled_lean
+def _lever(bx: float, by: float, bz: float, out: Array) -> None:
+    """Write G = (1, −[b]×), by which a cell's motion (6,) moves the end of an arm b: (3, 6)."""
+    out[:, :] = 0.0
+    out[0, 0] = out[1, 1] = out[2, 2] = 1.0
+    out[0, 4], out[0, 5] = bz, -by
+    out[1, 3], out[1, 5] = -bz, bx
+    out[2, 3], out[2, 4] = by, -bx
 
 
-@compiled
+@compiled_lean
+def _add_crossed(
+    o: int, p: int, d: Array, length: float, tension: float, slope: float, one: Array, other: Array, stiffness: Array
+) -> None:
+    """Add what the motion of one cell does to the load that a bond between two puts on the other.
+
+    With d = L n, K as in `_add_bond` and both levers G (3, 6): −Gᵀ K G′, and its transpose.
+    """
+    side = tension / length
+    along = (slope - side) / (length * length)
+    for i in range(6):
+        for j in range(6):
+            total = 0.0
+            for k in range(3):
+                for m in range(3):
+                    spring = along * d[k] * d[m] + (side if k == m else 0.0)
+                    total -= one[k, i] * spring * other[m, j]
+            stiffness[o + i, p + j] += total
+            stiffness[p + j, o + i] += total
+
+
+@compiled_lean
 def _add_pair_contact(
     i: int, j: int, moved: Array, system: System, motion: Motion, load: Array, stiffness: Array
 ) -> None:
@@ -108,49 +128,108 @@ def _add_pair_contact(
                     stiffness[6 * place + a, 6 * other + b] -= k_ab
 
 
-@compiled
-def _add_loads(
-    group: int, moved: Array, system: System, bonds: Bonds, motion: Motion, load: Array, stiffness: Array
+@compiled_lean
+def _pose(cell: int, place: int, moved: Array, motion: Motion, turn: Array, work: Work) -> None:
+    """Write a cell's place and rotation matrix, once it has moved, into `work`; a place of -1 is a held cell."""
+    centre, turned = work.middle[cell], work.middle_turn[cell]
+    for i in range(3):
+        centre[i] = motion.centre[cell, i] + (moved[6 * place + i] if place >= 0 else 0.0)
+        for j in range(3):
+            turned[i, j] = turn[cell, i, j]
+    if place >= 0:
+        rx, ry, rz = moved[6 * place + 3], moved[6 * place + 4], moved[6 * place + 5]
+        for j in range(3):
+            turned[0, j], turned[1, j], turned[2, j] = turned_vector(
+                turned[0, j], turned[1, j], turned[2, j], rx, ry, rz
+            )
+
+
+@compiled_lean
+def _add_wall_bonds(cell: int, o: int, system: System, bonds: Bonds, work: Work) -> None:
+    """Add the loads of a cell's bonds to the wall."""
+    # taken out of their tuples here, since doing so costs a hundred sums
+    arms, first, slack_below, tables = (
+        system.molecules.arm, system.species.first, system.species.slack_below, system.species.tables,
+    )  # fmt: skip
+    site, species, state, partner, anchor = bonds.site, bonds.species, bonds.state, bonds.partner, bonds.anchor
+    load, stiffness, centre, turn = work.load, work.stiffness, work.middle[cell], work.middle_turn[cell]
+    for bond in range(bonds.first[cell], bonds.first[cell] + bonds.count[cell]):
+        ax, ay, az = arms[site[bond], 0], arms[site[bond], 1], arms[site[bond], 2]
+        bx = turn[0, 0] * ax + turn[0, 1] * ay + turn[0, 2] * az
+        by = turn[1, 0] * ax + turn[1, 1] * ay + turn[1, 2] * az
+        bz = turn[2, 0] * ax + turn[2, 1] * ay + turn[2, 2] * az
+        dx = centre[0] + bx - anchor[bond, 0]
+        dy = centre[1] + by - anchor[bond, 1]
+        dz = centre[2] + bz - anchor[bond, 2]
+        slack = slack_below[species[bond]]
+        square = dx * dx + dy * dy + dz * dz
+        if partner[bond] < 0 and square > slack * abs(slack):
+            length = math.sqrt(square)
+            table = first[species[bond]] + state[bond]
+            tension, slope = value_and_slope(tables, table, TENSION, length)
+            _add_bond(o, bx, by, bz, dx, dy, dz, length, tension, slope, load, stiffness)
+
+
+@compiled_lean
+def _add_bridge(
+    bond: int, cell: int, o: int, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work
 ) -> None:
-    """Add all loads but the fluid's, and their stiffness, for the group displaced and turned by `moved` (6n,)."""
+    """Add the loads of a bond between two cells on both; a partner that is held takes none."""
+    molecules, species = system.molecules, system.species
+    partner = bonds.partner[bond]
+    place = system.groups.place[partner]
+    _pose(partner, place, work.moved, motion, turn, work)
+    mine, theirs = (
+        place_of(bonds.site[bond], work.middle[cell], work.middle_turn[cell], molecules),
+        place_of(bonds.ligand[bond], work.middle[partner], work.middle_turn[partner], molecules),
+    )
+    d, b, e = work.ends[0], work.ends[1], work.ends[2]
+    for i in range(3):
+        d[i] = mine[i] - theirs[i]
+        b[i] = mine[i] - work.middle[cell, i]
+        e[i] = theirs[i] - work.middle[partner, i]
+    length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    table = species.first[bonds.species[bond]] + bonds.state[bond]
+    tension, slope = value_and_slope(species.tables, table, TENSION, length)
+    if length == 0.0 or (tension == 0.0 and slope == 0.0):
+        return
+    _add_bond(o, b[0], b[1], b[2], d[0], d[1], d[2], length, tension, slope, work.load, work.stiffness)
+    if place >= 0:
+        p = 6 * place
+        _add_bond(p, e[0], e[1], e[2], -d[0], -d[1], -d[2], length, tension, slope, work.load, work.stiffness)
+        _lever(b[0], b[1], b[2], work.levers[0])
+        _lever(e[0], e[1], e[2], work.levers[1])
+        _add_crossed(o, p, d, length, tension, slope, work.levers[0], work.levers[1], work.stiffness)
+
+
+@compiled_lean
+def _add_loads(group: int, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work) -> None:
+    """Write all loads but the fluid's, and their stiffness, for the group displaced and turned by `work.moved` (6n,)."""
     bodies, groups, contacts = system.bodies, system.groups, system.contacts
+    load, stiffness, moved = work.load, work.stiffness, work.moved
     start = groups.first[group]
-    arm = np.empty(3)
+    load[:] = 0.0
+    stiffness[:, :] = 0.0
     for place in range(groups.first[group + 1] - start):
         cell = groups.cells[start + place]
         o = 6 * place
-        own, own_stiffness = load[o : o + 6], stiffness[o : o + 6, o : o + 6]
         for i in range(6):
-            own[i] += bodies.external[cell, i]
+            load[o + i] += bodies.external[cell, i]
         tip_gap = motion.gap[cell] + moved[o + 2] - bodies.roughness[cell] - bodies.wall_tips
         if tip_gap < contacts.reach:
-            _add_wall_contact(tip_gap, contacts.law, own, own_stiffness)
-        for bond in range(bonds.first[cell], bonds.first[cell] + bonds.count[cell]):
-            arm[0], arm[1], arm[2] = turned_vector(
-                bonds.arm[bond, 0], bonds.arm[bond, 1], bonds.arm[bond, 2], moved[o + 3], moved[o + 4], moved[o + 5]
-            )
-            x = motion.centre[cell, 0] + moved[o] + arm[0] - bonds.anchor[bond, 0]
-            y = motion.centre[cell, 1] + moved[o + 1] + arm[1] - bonds.anchor[bond, 1]
-            z = motion.centre[cell, 2] + moved[o + 2] + arm[2] - bonds.anchor[bond, 2]
-            kind = bonds.species[bond]
-            if x * x + y * y + z * z > system.species.slack_below[kind] ** 2:
-                table = system.species.first[kind] + bonds.state[bond]
-                _add_bond(arm, x, y, z, table, system.species, own, own_stiffness)
+            force, slope = value_and_slope(contacts.law, 0, 0, tip_gap)
+            load[o + 2] += force
+            stiffness[o + 2, o + 2] -= slope
+        if bonds.count[cell] > 0:
+            _pose(cell, place, moved, motion, turn, work)
+            _add_wall_bonds(cell, o, system, bonds, work)
+            for k in range(bonds.bridges[cell]):
+                _add_bridge(bonds.bridge[bonds.first[cell] + k], cell, o, system, bonds, motion, turn, work)
     for p in range(contacts.pair_first[group], contacts.pair_first[group + 1]):
         _add_pair_contact(contacts.pairs[p, 0], contacts.pairs[p, 1], moved, system, motion, load, stiffness)
 
 
-@compiled
-def attach(cell: int, turn: Array, molecules: Molecules, bonds: Bonds) -> None:
-    """Turn the arms of a cell's bonds into space."""
-    for bond in range(bonds.first[cell], bonds.first[cell] + bonds.count[cell]):
-        site = bonds.site[bond]
-        ax, ay, az = molecules.arm[site, 0], molecules.arm[site, 1], molecules.arm[site, 2]
-        for i in range(3):
-            bonds.arm[bond, i] = turn[i, 0] * ax + turn[i, 1] * ay + turn[i, 2] * az
-
-
-@compiled
+@compiled_lean
 def _surface_move(change: Array, dt: float, radii: Array) -> float:
     """Give the largest displacement of a surface that velocities (6n,) make in dt; infinity where one is no number."""
     largest = 0.0
@@ -163,8 +242,8 @@ def _surface_move(change: Array, dt: float, radii: Array) -> float:
     return largest
 
 
-@compiled
-def _newton(group: int, dt: float, system: System, bonds: Bonds, motion: Motion, work: Work) -> bool:
+@compiled_lean
+def _newton(group: int, dt: float, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work) -> bool:
     """Solve for the velocities (6n,) at which fluid and loads balance at the sub-step's end; tell whether it did."""
     velocity, load, matrix, stiffness = work.velocity, work.load, work.matrix, work.stiffness
     residual, change = work.residual, work.change
@@ -172,11 +251,9 @@ def _newton(group: int, dt: float, system: System, bonds: Bonds, motion: Motion,
     best = np.inf
     share = 1.0
     for _ in range(_MOST_ITERATIONS):
-        load[:] = 0.0
-        stiffness[:, :] = 0.0
         for i in range(m):
             work.moved[i] = dt * velocity[i]
-        _add_loads(group, work.moved, system, bonds, motion, load, stiffness)
+        _add_loads(group, system, bonds, motion, turn, work)
         norm = 0.0
         for i in range(m):
             residual[i] = work.right[i] + load[i]
@@ -204,7 +281,7 @@ def _newton(group: int, dt: float, system: System, bonds: Bonds, motion: Motion,
     return False
 
 
-@compiled
+@compiled_lean
 def _lead(group: int, dt: float, system: System, motion: Motion, gaps: Array) -> None:
     """Write the gaps that a group's last velocities give for the middle of a sub-step, into those of all cells."""
     for place in range(system.groups.first[group], system.groups.first[group + 1]):
@@ -213,8 +290,8 @@ def _lead(group: int, dt: float, system: System, motion: Motion, gaps: Array) ->
         gaps[cell] = motion.gap[cell] + min(max(0.5 * dt * motion.velocity[cell, 2], -most), most)
 
 
-@compiled
-def advance(group: int, dt: float, system: System, bonds: Bonds, motion: Motion, work: Work) -> float:
+@compiled_lean
+def advance(group: int, dt: float, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work) -> float:
     """Try to move a group over dt; write where it ends into `work`.
 
     With thermal motion `work.noise` (6n,) are the increments (s^½) of the Brownian paths over dt.
@@ -231,16 +308,15 @@ def advance(group: int, dt: float, system: System, bonds: Bonds, motion: Motion,
     share = GAP_SHARE
     if system.thermal.energy.shape[0] == 0:
         _lead(group, dt, system, motion, work.gaps)
-        resistance(group, system, work.gaps, work.matrix, work.right)
+        resistance(group, system, work.gaps, work.functions, work.matrix, work.right)
     for k in range(system.thermal.energy.shape[0]):
         share = SHAKEN_SHARE
-        resistance(group, system, motion.gap, work.matrix, work.right)
-        if not shake(group, dt, system.thermal.energy[k], work.noise, system, motion.gap, work.matrix, work.right):
+        if not shake(group, dt, system.thermal.energy[k], system, motion.gap, work):
             return math.inf
     for place in range(n):
         for i in range(6):
             velocity[6 * place + i] = motion.velocity[groups.cells[start + place], i]
-    if not _newton(group, dt, system, bonds, motion, work):
+    if not _newton(group, dt, system, bonds, motion, turn, work):
         return math.inf
     for place in range(n):
         cell, o = groups.cells[start + place], 6 * place
@@ -254,7 +330,7 @@ def advance(group: int, dt: float, system: System, bonds: Bonds, motion: Motion,
     return 0.5 * _surface_move(work.change, dt, work.radius)
 
 
-@compiled
+@compiled_lean
 def _try_out(group: int, dt: float, system: System, motion: Motion, work: Work) -> None:
     """Write where the group's cells are after dt."""
     for place in range(work.radius.shape[0]):
@@ -270,7 +346,7 @@ def _try_out(group: int, dt: float, system: System, motion: Motion, work: Work) 
         matrix_of(work.orientation[cell], work.turn[cell])
 
 
-@compiled
+@compiled_lean
 def commit(group: int, dt: float, system: System, motion: Motion, turn: Array, work: Work) -> None:
     """Let the group be where `advance` over dt has taken it."""
     for place in range(work.radius.shape[0]):
@@ -288,21 +364,21 @@ def commit(group: int, dt: float, system: System, motion: Motion, turn: Array, w
             motion.orientation[cell, i] = work.orientation[cell, i]
 
 
-@compiled
-def step_explicitly(group: int, dt: float, system: System, bonds: Bonds, motion: Motion, work: Work) -> None:
+@compiled_lean
+def step_explicitly(
+    group: int, dt: float, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work
+) -> None:
     """Write into `work` the velocities that balance the loads of the start, and where they take a group in dt."""
-    resistance(group, system, motion.gap, work.matrix, work.right)
-    work.load[:] = 0.0
+    resistance(group, system, motion.gap, work.functions, work.matrix, work.right)
     work.moved[:] = 0.0
-    work.stiffness[:, :] = 0.0
-    _add_loads(group, work.moved, system, bonds, motion, work.load, work.stiffness)
+    _add_loads(group, system, bonds, motion, turn, work)
     for i in range(work.velocity.shape[0]):
         work.velocity[i] = work.right[i] + work.load[i]
     solve_in_place(work.matrix, work.velocity)
     _try_out(group, dt, system, motion, work)
 
 
-@compiled
+@compiled_lean
 def refresh_turns(motion: Motion, turns: Array) -> None:
     """Write the rotation matrices of all cells."""
     for cell in range(turns.shape[0]):

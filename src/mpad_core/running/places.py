@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled, compiled_inline
+from mpad_core.numerics.compiled import compiled_inline, compiled_lean
 from mpad_core.numerics.streams import Stream, Word, mixed, uniform, uniform_pair
 from mpad_core.running.layout import Molecules
 
@@ -39,13 +39,13 @@ def distance(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -
     return math.sqrt((ax - bx) ** 2 + (ay - by) ** 2 + (az - bz) ** 2)
 
 
-@compiled
+@compiled_lean
 def square_of(i: int, j: int) -> int:
     """Give the identity of a square of the wall; its last eight bits are free for the molecule's number."""
     return int((np.int64(i) & 0xFFFFFF) << 32 | (np.int64(j) & 0xFFFFFF) << 8)
 
 
-@compiled
+@compiled_lean
 def ligands_of(key: Word, kind: int, i: int, j: int, density: float) -> int:
     """Give the number of the wall's molecules in a square: Poisson, by inversion."""
     u = uniform(key, _LIGANDS, mixed(square_of(i, j), kind), 0)
@@ -59,7 +59,7 @@ def ligands_of(key: Word, kind: int, i: int, j: int, density: float) -> int:
     return number
 
 
-@compiled
+@compiled_lean
 def ligand_at(key: Word, kind: int, i: int, j: int, number: int) -> tuple[int, float, float, float]:
     """Give identity, x, y and mark of one of a square's molecules; the mark thins the densest to the local density."""
     u, v = uniform_pair(key, _LIGANDS, mixed(square_of(i, j), kind), 1 + number)

@@ -3,7 +3,7 @@
 import math
 
 from mpad_core.arrays import Array, Flags
-from mpad_core.numerics.compiled import compiled, compiled_inline
+from mpad_core.numerics.compiled import compiled_inline, compiled_lean
 from mpad_core.numerics.streams import Stream, Word, mixed, uniform
 from mpad_core.numerics.tables import value
 from mpad_core.running.densities import density_at
@@ -33,7 +33,7 @@ def _leaving_rate(kind: int, state: int, length: float, species: Species) -> flo
     return rate
 
 
-@compiled
+@compiled_lean
 def _is_taken(kind: int, ligand: int, bonds: Bonds) -> bool:
     """Tell whether one of the wall's molecules is bound already, to whichever cell."""
     for cell in range(bonds.count.shape[0]):
@@ -64,7 +64,7 @@ def _forming_rate(kind: int, length: float, species: Species) -> float:
     return rate
 
 
-@compiled
+@compiled_lean
 def rates(
     cell: int, stop: float, centre: Array, turn: Array, system: System, bonds: Bonds, bound: Flags, listed: Candidates,
     factor: Array,
@@ -122,7 +122,7 @@ def rates(
     return total, -1, 0.0
 
 
-@compiled
+@compiled_lean
 def _record(
     kind: int, bond: int, cell: int, length: float, step: int, time: float, system: System, bonds: Bonds,
     progress: Progress, events: Array,
@@ -148,7 +148,18 @@ def _record(
     progress.events[0] += 1
 
 
-@compiled
+@compiled_lean
+def list_bridges(cell: int, bonds: Bonds) -> None:
+    """List which of a cell's bonds are to other cells."""
+    first, found = bonds.first[cell], 0
+    for bond in range(first, first + bonds.count[cell]):
+        if bonds.partner[bond] >= 0:
+            bonds.bridge[first + found] = bond
+            found += 1
+    bonds.bridges[cell] = found
+
+
+@compiled_lean
 def _drop(bond: int, cell: int, bonds: Bonds, bound: Flags) -> None:
     """Take a bond out of its cell's; the others keep their order."""
     bound[bonds.site[bond]] = 0
@@ -164,9 +175,11 @@ def _drop(bond: int, cell: int, bonds: Bonds, bound: Flags) -> None:
         for a in range(3):
             bonds.anchor[b, a] = bonds.anchor[b + 1, a]
     bonds.count[cell] -= 1
+    if bonds.bridges[cell] > 0:
+        list_bridges(cell, bonds)
 
 
-@compiled
+@compiled_lean
 def _bind(
     candidate: int, cell: int, angle: float, centre: Array, turn: Array, system: System, bonds: Bonds, bound: Flags,
     listed: Candidates,
@@ -190,10 +203,13 @@ def _bind(
     bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2] = x, y, tips
     bonds.count[cell] += 1
     bound[site] = 1
+    if bonds.partner[bond] >= 0:
+        bound[bonds.ligand[bond]] = 1
+        list_bridges(cell, bonds)
     return bond
 
 
-@compiled
+@compiled_lean
 def _changed(bond: int, length: float, excess: float, system: System, bonds: Bonds) -> int:
     """Give the inner state that a bond changes to, or -1 if it breaks.
 
@@ -209,7 +225,7 @@ def _changed(bond: int, length: float, excess: float, system: System, bonds: Bon
     return -1
 
 
-@compiled
+@compiled_lean
 def _born_state(kind: int, length: float, share: float, system: System) -> int:
     """Give the inner state that a new bond has, for a share of the sum of the rates into all of them."""
     first, last = system.species.first[kind], system.species.first[kind + 1] - 1
@@ -224,7 +240,7 @@ def _born_state(kind: int, length: float, share: float, system: System) -> int:
     return last - first
 
 
-@compiled
+@compiled_lean
 def happen(
     cell: int, which: int, excess: float, step: int, time: float, centre: Array, turn: Array, key: Word,
     system: System, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
@@ -255,7 +271,7 @@ def happen(
         _drop(bond, cell, bonds, bound)
 
 
-@compiled
+@compiled_lean
 def slip_factors(cell: int, velocity: Array, gap: float, system: System, out: Array) -> None:
     """Write the factors (K,) that a cell's slip past the wall puts on its on-rates; `velocity` (6,)."""
     species, lever = system.species, system.bodies.radius[cell] + gap

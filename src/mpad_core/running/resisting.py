@@ -2,15 +2,13 @@
 
 import math
 
-import numpy as np
-
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled
-from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
+from mpad_core.numerics.compiled import compiled_lean
+from mpad_core.numerics.wall_functions import add_wall_resistance
 from mpad_core.running.layout import System
 
 
-@compiled
+@compiled_lean
 def is_positive_definite(matrix: Array) -> bool:
     """Tell whether a symmetric matrix has a Cholesky factor, which is written into its lower triangle."""
     m = matrix.shape[0]
@@ -26,7 +24,7 @@ def is_positive_definite(matrix: Array) -> bool:
     return True
 
 
-@compiled
+@compiled_lean
 def solve_in_place(matrix: Array, right: Array) -> None:
     """Solve by Gaussian elimination with partial pivoting; the answer replaces `right`, the matrix is overwritten."""
     m = matrix.shape[0]
@@ -51,23 +49,21 @@ def solve_in_place(matrix: Array, right: Array) -> None:
         right[k] /= matrix[k, k]
 
 
-@compiled
-def resistance(group: int, system: System, gaps: Array, matrix: Array, right: Array) -> None:
-    """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at gaps (N,) to the wall."""
+@compiled_lean
+def resistance(group: int, system: System, gaps: Array, functions: Array, matrix: Array, right: Array) -> None:
+    """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at gaps (N,) to the wall; `functions` (8,) is scratch."""
     bodies, groups = system.bodies, system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
-    size = 36 * n * n
-    offset = groups.coupling_first[group]
-    matrix[:, :] = groups.coupling[offset : offset + size].reshape(6 * n, 6 * n)
-    own = np.empty((6, 6))
-    ambient = np.empty(6)
+    m, offset, coupling = 6 * n, groups.coupling_first[group], groups.coupling
+    for i in range(m):
+        for j in range(m):
+            matrix[i, j] = coupling[offset + m * i + j]
     for place in range(n):
         cell = groups.cells[start + place]
         o = 6 * place
-        radius = bodies.radius[cell]
-        height = gaps[cell] + radius
-        felt = gaps[cell] + bodies.wall_offset
-        wall_resistance(height, felt, radius, bodies.viscosity, own)
-        wall_shear_load(height, felt, radius, bodies.viscosity, bodies.shear_rate, ambient)
-        matrix[o : o + 6, o : o + 6] += own
-        right[o : o + 6] = ambient + groups.load[cell]
+        for i in range(6):
+            right[o + i] = groups.load[cell, i]
+        height, felt = gaps[cell] + bodies.radius[cell], gaps[cell] + bodies.wall_offset
+        add_wall_resistance(
+            o, height, felt, bodies.radius[cell], bodies.viscosity, bodies.shear_rate, functions, matrix, right
+        )

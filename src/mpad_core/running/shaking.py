@@ -23,12 +23,10 @@ to do, and short enough that what comes out too large is a matter of five standa
 
 import math
 
-import numpy as np
-
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled_lean
 from mpad_core.numerics.streams import Stream, Word, mixed, normal_pair
-from mpad_core.running.layout import System
+from mpad_core.running.layout import System, Work
 from mpad_core.running.resisting import is_positive_definite, resistance
 
 TICKS = 1 << 30  # a sub-step is never split finer, and events fall on these: 1 ps of 1 ms
@@ -38,7 +36,7 @@ RMS_SHARE = 0.1  # of the gap that thermal motion crosses in one part, root mean
 _THERMAL = int(Stream.THERMAL)
 
 
-@compiled
+@compiled_lean
 def path(key: Word, owner: Word, pair: int, step: int, tick: int) -> tuple[float, float]:
     """Give two Brownian paths of variance t at t = tick/TICKS of sub-step `step`; pairs 0 to 2 are a cell's six."""
     if tick == 0:
@@ -59,7 +57,7 @@ def path(key: Word, owner: Word, pair: int, step: int, tick: int) -> tuple[float
     return x_high, y_high
 
 
-@compiled
+@compiled_lean
 def draw(group: int, system: System, key: Word, step: int, first: int, last: int, dt: float, noise: Array) -> None:
     """Write the increments (s^½) of a group's paths from tick to tick of a sub-step of dt into the first 6n places."""
     start, end = system.groups.first[group], system.groups.first[group + 1]
@@ -71,7 +69,7 @@ def draw(group: int, system: System, key: Word, step: int, first: int, last: int
         noise[2 * k + 1] = math.sqrt(dt) * (y_to - y_from)
 
 
-@compiled
+@compiled_lean
 def longest_part(group: int, dt: float, energy: float, system: System, gaps: Array) -> int:
     """Give over how many ticks of a sub-step of dt heat, kT = `energy`, may move a group at gaps (N,).
 
@@ -89,29 +87,27 @@ def longest_part(group: int, dt: float, energy: float, system: System, gaps: Arr
     return ticks
 
 
-@compiled
-def shake(
-    group: int, dt: float, energy: float, noise: Array, system: System, gaps: Array, matrix: Array, right: Array
-) -> bool:
-    """Take a group's resistance to the midpoint and add the random load; tell whether dt is short enough for that.
+@compiled_lean
+def shake(group: int, dt: float, energy: float, system: System, gaps: Array, work: Work) -> bool:
+    """Write a group's resistance at the midpoint, and the random load beside it; tell whether dt is short enough.
 
     Parameters
     ----------
     energy
         kT, pN µm.
-    noise : (6n,) or more
-        From `draw`, over dt.
     gaps : (N,)
         Of all cells to the wall, at the start.
-    matrix, right : (6n, 6n), (6n,)
-        What `resistance` wrote at the start; overwritten.
+    work
+        Its noise is from `draw`, over dt; matrix and right are written.
     """
+    matrix, right, noise, push, star, middle = work.matrix, work.right, work.noise, work.push, work.star, work.gaps
+    resistance(group, system, gaps, work.functions, matrix, right)
     m = matrix.shape[0]
     if not is_positive_definite(matrix):
         return False
     strength = math.sqrt(2 * energy) / dt
-    push, star = np.zeros(m), np.zeros(m)
     for i in range(m):
+        push[i] = 0.0
         for j in range(i + 1):
             push[i] += strength * matrix[i, j] * noise[j]
     for i in range(m - 1, -1, -1):  # U* = L⁻ᵀ w (2kT)^½/dt
@@ -119,14 +115,13 @@ def shake(
         for j in range(i + 1, m):
             star[i] -= matrix[j, i] * star[j]
         star[i] /= matrix[i, i]
-    middle = gaps.copy()
     for place in range(m // 6):
         cell = system.groups.cells[system.groups.first[group] + place]
         change = 0.5 * dt * star[6 * place + 2]
         if not abs(change) <= SHAKEN_SHARE * (gaps[cell] + system.bodies.wall_offset):
             return False
-        middle[cell] += change
-    resistance(group, system, middle, matrix, right)
+        middle[cell] = gaps[cell] + change
+    resistance(group, system, middle, work.functions, matrix, right)
     for i in range(m):
         right[i] += push[i]
     return True
