@@ -12,6 +12,7 @@ from mpad_core.interfaces.forces import GapForce
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.surface import Surface
 from mpad_core.interfaces.values import Setting
+from mpad_core.physics.layouts.layout import Layout
 
 LARGEST_GROUP = 8  # cells whose coupling is solved together within a burst, whose cost grows with the cube
 _PER_CELL = (
@@ -92,6 +93,7 @@ class Problem:
     thermal_energy: float = 0.0  # pN µm, kT of the cells' thermal motion; 0 where there is none
     effects: tuple[Effect, ...] = ()
     site_kinds: tuple[str, ...] = field(default=())
+    layouts: tuple[tuple[Layout, ...], ...] = field(default=())  # of each cell, for each site kind; none: uniform
 
     def only(self, cells: Any) -> "Problem":
         """Give the problem of some of the cells, the others taken away."""
@@ -103,5 +105,6 @@ class Problem:
             names=tuple(self.names[i] for i in chosen),
             kinds=tuple(self.kinds[i] for i in chosen),
             partner=partner,
+            layouts=tuple(self.layouts[i] for i in chosen) if self.layouts else (),
             **{name: getattr(self, name)[chosen] for name in _PER_CELL},
         )

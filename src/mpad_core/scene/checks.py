@@ -4,7 +4,6 @@ References are checked on the tables of the file, so that they are reported toge
 whatever has the wrong type there is passed over, since it is a fault already.
 """
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,13 +13,13 @@ from mpad_core.plugins.registry import nearest
 from mpad_core.scene import conditions
 from mpad_core.scene.faults import Fault, Path, WrongError, listed, shown
 from mpad_core.scene.parts import try_build
+from mpad_core.scene.site_layouts import site_faults
 from mpad_core.scene.spec import Cell, Group, Scene
 from mpad_core.units import thermal_energy
 
 Tables = dict[str, Any]
 
 _MOST = 20  # faults of one sort; a file may hold thousands
-_MOST_SITES = 1e8  # binding sites on one cell
 
 
 def references(data: Tables) -> Iterator[Fault]:
@@ -180,12 +179,7 @@ def _overlaps(scene: Scene) -> Iterator[Fault]:
 def _sites(scene: Scene) -> Iterator[Fault]:
     for name, kind in scene.kinds.items():
         for site, sites in kind.sites.items():
-            number = 4 * math.pi * kind.radius**2 * sites.density
-            if number > _MOST_SITES:
-                yield Fault(
-                    ("kinds", name, "sites", site, "density"),
-                    f"makes {number:.2g} sites on each cell, the most is {_MOST_SITES:.0g}; lower it",
-                )
+            yield from (fault.under(("kinds", name, "sites", site)) for fault in site_faults(kind, sites))
 
 
 def _models(scene: Scene) -> Iterator[Fault]:

@@ -8,9 +8,12 @@ from attrs import evolve
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.values import Configuration, Setting
+from mpad_core.physics.layouts.layout import Layout
+from mpad_core.physics.layouts.uniform import Uniform
 from mpad_core.physics.problem import BondSpecies, CaughtWhen, Effect, Problem, Tolerances
 from mpad_core.physics.questions import check_needs
 from mpad_core.scene.effects import decide
+from mpad_core.scene.site_layouts import layout_of
 from mpad_core.scene.spec import Cell, Group, Scene
 from mpad_core.units import thermal_energy
 
@@ -76,6 +79,7 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         thermal_energy=thermal_energy(scene.fluid.temperature) if effects["thermal"].on else 0.0,
         effects=tuple(effects.values()),
         site_kinds=_site_names(scene),
+        layouts=_layouts(scene, cells),
     )
 
 
@@ -98,6 +102,12 @@ def _site_densities(scene: Scene, cells: dict[str, Cell | Group]) -> Array:
             site = scene.kinds[cell.kind].sites.get(name)
             densities[i, j] = site.density if site else 0.0
     return densities
+
+
+def _layouts(scene: Scene, cells: dict[str, Cell | Group]) -> tuple[tuple[Layout, ...], ...]:
+    """Give how each cell's sites lie; uniformly where it has none."""
+    found = [[scene.kinds[cell.kind].sites.get(name) for name in _site_names(scene)] for cell in cells.values()]
+    return tuple(tuple(layout_of(sites) if sites else Uniform() for sites in row) for row in found)
 
 
 def _species(scene: Scene) -> tuple[BondSpecies, ...]:

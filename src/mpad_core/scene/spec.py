@@ -175,8 +175,14 @@ class Wall:
 class CellSites:
     """One kind of binding site on cells."""
 
-    layout: Literal["uniform"] = _says('how sites lie on the cell; only "uniform"', default="uniform")
+    layout: Literal["uniform", "microvilli", "clusters"] = _says("how sites lie on the cell", default="uniform")
     density: float = _measure("1/um^2", _SITE_DENSITY, doc="sites per area of the smooth sphere")
+    tips: float | None = _measure("1/um^2", Within(0, 1e4), default=None, doc="microvilli per area")
+    tip_radius: float | None = _measure("um", Within(0, 100, above=True), default=None, doc="radius of a tip")
+    cluster_size: float | None = _says("mean number of sites in a cluster", default=None, valid=Within(1, 1e6))
+    cluster_radius: float | None = _measure(
+        "um", Within(0, 100, above=True), default=None, doc="standard deviation of a cluster in either direction"
+    )
 
 
 @frozen(kw_only=True)

@@ -1,0 +1,1 @@
+"""How molecules lie on a cell; one module a law. None imports compiled code: `mpad check` makes them too."""
