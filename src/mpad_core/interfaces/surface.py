@@ -18,3 +18,15 @@ class Surface(Protocol):
     def densest(self) -> float:
         """Give an upper bound of the density (1/µm²) over the whole wall."""
         ...
+
+
+@runtime_checkable
+class Resolving(Protocol):
+    """A surface that says how finely its density has to be sampled."""
+
+    def resolution(self) -> float:
+        """Give the length (µm) below which the density does not vary but at sharp edges; infinite if it is uniform.
+
+        The core samples it at this spacing: an edge is right to half of it.
+        """
+        ...

@@ -15,6 +15,7 @@ from attrs import frozen
 
 from mpad_core.interfaces.errors import InputError
 from mpad_core.scene import checks, overriding
+from mpad_core.scene.attached import attach_files
 from mpad_core.scene.faults import MOST_FAULTS, Fault, Path, dotted, one_line
 from mpad_core.scene.lines import LARGEST_TEXT, key_lines, refusal
 from mpad_core.scene.spec import Scene
@@ -69,11 +70,13 @@ def load_scene(path: str | PathLike[str], overrides: Sequence[str] = ()) -> Scen
     InputError
         With one line for each thing wrong.
     """
-    return parse_scene(_read(path), str(path), overrides)
+    return parse_scene(_read(path), str(path), overrides, FilePath(path).parent)
 
 
-def parse_scene(text: str, name: str = "<scene>", overrides: Sequence[str] = ()) -> Scene:
-    """Read a scene from TOML text; ``name`` stands for the file in messages.
+def parse_scene(
+    text: str, name: str = "<scene>", overrides: Sequence[str] = (), folder: str | PathLike[str] = "."
+) -> Scene:
+    """Read a scene from TOML text; ``name`` stands for the file in messages, ``folder`` is where its files are.
 
     Raises
     ------
@@ -83,6 +86,7 @@ def parse_scene(text: str, name: str = "<scene>", overrides: Sequence[str] = ())
     data = _parsed(text, name)
     source = _Source(name, text, tuple(overriding.apply(data, overrides)))
     filled = _fill_densities(data)
+    attach_files(data, folder)
     scene, found = _structured(data)
     found = [fault for fault in found if fault.path not in filled]
     found += islice(checks.references(data), MOST_FAULTS)

@@ -35,6 +35,10 @@ class Everywhere:
         """Give the density (1/µm²)."""
         return self.sites
 
+    def resolution(self) -> float:
+        """Give infinity (µm): it does not vary."""
+        return np.inf
+
 
 def typical(made: Any, **given: Any) -> Any:
     """Make a part with its defaults, and with typical numbers for parameters that have none.

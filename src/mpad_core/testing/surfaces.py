@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.surface import Surface
+from mpad_core.interfaces.surface import Resolving, Surface
 from mpad_core.testing.strategies import numbers, tried
 
 _PLACES = st.lists(st.tuples(numbers(-1e4, 1e4), numbers(-1e4, 1e4)), min_size=1, max_size=20).map(np.array)
@@ -52,6 +52,17 @@ class SurfaceContract:
         """The bound is finite and not negative."""
         assert np.isfinite(self.surface.densest())
         assert self.surface.densest() >= 0
+
+    @given(places=_PLACES)
+    @tried(30)
+    def test_resolution(self, places: Array) -> None:
+        """If it says how finely it varies, that is a length; an infinite one means that it does not vary at all."""
+        if not isinstance(self.surface, Resolving):
+            return
+        assert self.surface.resolution() > 0
+        if np.isinf(self.surface.resolution()):
+            densities = np.asarray(self.surface.density(places[:, 0], places[:, 1]))
+            assert (densities == densities[0]).all()
 
     def test_pure(self) -> None:
         """Asked again it says the same, and it leaves its input alone."""

@@ -34,6 +34,10 @@ class Uniform:
         """Give the density (1/µm²)."""
         return self.site_density
 
+    def resolution(self) -> float:
+        """Give infinity (µm): it does not vary."""
+        return np.inf
+
 
 @hookimpl
 def mpad_surfaces() -> list[type[Surface]]:
