@@ -27,6 +27,6 @@ class Resolving(Protocol):
     def resolution(self) -> float:
         """Give the length (µm) below which the density does not vary but at sharp edges; infinite if it is uniform.
 
-        The core samples it at this spacing: an edge is right to half of it.
+        The core samples it on squares of this side: an edge is off by half their diagonal at most.
         """
         ...

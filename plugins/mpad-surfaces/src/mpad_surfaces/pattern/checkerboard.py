@@ -22,7 +22,8 @@ class Checkerboard:
         side = 0.5 * self.period
         column = np.floor(along(x, y, self.angle) / side)
         row = np.floor(along(x, y, self.angle + 90) / side)
-        return np.where((column + row) % 2 == 0, 1.0, 0.0)
+        pairs = 0.5 * (column + row)
+        return np.where(pairs == np.floor(pairs), 1.0, 0.0)  # where their sum is even; remainders take thrice as long
 
     def resolution(self) -> float:
         """Give a fiftieth of the period, or less (µm)."""
