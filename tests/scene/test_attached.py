@@ -1,4 +1,4 @@
-"""Files that a scene's parts are given: found beside the scene, kept by their sums in the resolved one."""
+"""Files that a scene's parts are given: found beside the scene, known by their sums, kept in the run directory."""
 
 import hashlib
 from pathlib import Path
@@ -9,6 +9,7 @@ import pytest
 from attrs import frozen
 
 from mpad_core.interfaces.errors import InputError
+from mpad_core.scene.attached import files_of
 from mpad_core.scene.files import load_scene, parse_scene, resolved_toml
 
 RAW = b"any bytes"
@@ -49,14 +50,25 @@ def test_a_file_lies_beside_the_scene_wherever_it_is_read_from(folder: Path, mon
         assert part.parameters["digest"] == hashlib.sha256(RAW).hexdigest()
 
 
-def test_the_resolved_scene_names_the_file_and_its_bytes(folder: Path) -> None:
+def test_the_resolved_scene_names_the_copy_and_its_bytes(folder: Path) -> None:
+    digest = hashlib.sha256(RAW).hexdigest()
     scene = load_scene(folder / "s.toml")
     text = resolved_toml(scene)
-    assert hashlib.sha256(RAW).hexdigest() in text
-    assert parse_scene(text, folder="/") == scene
+    assert f'table = "files/{digest[:12]}-table.csv"' in text
+    assert digest in text
+    (file,) = files_of(scene)
+    assert (file.path, file.kept_as) == (folder / "table.csv", f"files/{digest[:12]}-table.csv")
+    (folder / "files").mkdir()
+    (folder / "table.csv").rename(folder / file.kept_as)
+    again = parse_scene(text, folder=folder)
+    assert resolved_toml(again) == text
+    assert [copy.path for copy in files_of(again)] == [folder / file.kept_as]
+
+
+def test_a_changed_file_makes_another_scene(folder: Path) -> None:
+    text = resolved_toml(load_scene(folder / "s.toml"))
     (folder / "table.csv").write_bytes(RAW + b"!")
-    assert parse_scene(text) == scene  # what the sum should be is the scene's word; the part compares
-    assert resolved_toml(load_scene(folder / "s.toml")) != text  # so --resume refuses it as another scene
+    assert resolved_toml(load_scene(folder / "s.toml")) != text  # so --resume refuses it
 
 
 def test_a_files_part_refuses_at_its_line(folder: Path) -> None:
@@ -77,6 +89,7 @@ def test_in_every_place_of_a_part(folder: Path) -> None:
     assert scene.wall is not None
     assert scene.wall.sites["p"].parameters["digest"] == hashlib.sha256(RAW).hexdigest()
     assert scene.record.observers[1].parameters["table"] == "/table.csv"
+    assert [file.path.name for file in files_of(scene)] == ["table.csv"] * 2  # of the wall and of the repulsion
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The surface `pattern` in a scene: read, written, refused at its line."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +8,10 @@ import pytest
 from matplotlib import image
 
 from mpad_core.interfaces.errors import InputError
+from mpad_core.scene.attached import files_of
 from mpad_core.scene.compose import compose
 from mpad_core.scene.files import load_scene, parse_scene, resolved_toml
+from mpad_core.scene.spec import Scene
 
 UNIFORM = 'p-selectin = { layout = "uniform", density = "180 1/um^2" }'
 MASK = 'kind = "mask", high = "180 1/um^2", image = "grey.png", pixel = "2 um", origin = ["-5 um", "1 nm"]'
@@ -35,19 +38,30 @@ def patterned(examples: dict[str, str], said: str) -> str:
 def test_a_pattern_is_read_and_written_the_same(examples: dict[str, str], folder: Path, said: str) -> None:
     (folder / "s.toml").write_text(patterned(examples, said))
     scene = load_scene(folder / "s.toml")
-    again = parse_scene(resolved_toml(scene))
-    assert again == scene
+    text = resolved_toml(scene)
+    again = parse_scene(text, folder=with_copies(scene, folder))
+    assert resolved_toml(again) == text
     x, y = np.random.default_rng(1).uniform(-9, 9, (2, 50))
     surfaces = [compose(one).species[0].surface for one in (scene, again)]
     assert (surfaces[0].density(x, y) == surfaces[1].density(x, y)).all()
 
 
+def with_copies(scene: Scene, folder: Path) -> Path:
+    """Put copies of a scene's files where its resolved form looks for them."""
+    for file in files_of(scene):
+        (folder / file.kept_as).parent.mkdir(exist_ok=True)
+        shutil.copy(file.path, folder / file.kept_as)
+    return folder
+
+
 def test_a_resolved_scene_with_another_picture_is_refused(examples: dict[str, str], folder: Path) -> None:
     (folder / "s.toml").write_text(patterned(examples, MASK))
-    text = resolved_toml(load_scene(folder / "s.toml"))
-    image.imsave(folder / "grey.png", np.eye(4), cmap="gray")
+    scene = load_scene(folder / "s.toml")
+    text = resolved_toml(scene)
+    with_copies(scene, folder)
+    image.imsave(folder / files_of(scene)[0].kept_as, np.eye(4), cmap="gray", format="png")
     with pytest.raises(InputError, match=r"'pattern' refuses: image '.*' is not the one that this scene was made with"):
-        parse_scene(text)
+        parse_scene(text, folder=folder)
 
 
 FAULTS = [

@@ -1,8 +1,8 @@
 """Files that parts of a scene are given: found beside the scene, and told apart by their bytes.
 
 A part says with ``metadata={"file": "sha256"}`` that a parameter is the path of a file, and which other parameter takes
-the SHA-256 of its bytes. The path is made absolute and the sum is filled in when the scene is read, so the resolved
-scene names both, and the part can refuse a file that has changed since.
+the SHA-256 of its bytes. The path is made absolute and the sum is filled in when the scene is read, so the part can
+refuse a file of other bytes. A run directory keeps a copy of each file, and its resolved scene names that.
 """
 
 import hashlib
@@ -12,12 +12,45 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+from attrs import frozen
 
 from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.plugins import registry
-from mpad_core.scene.spec import PART_KEYS
+from mpad_core.scene.spec import PART_KEYS, Part, Scene
 
 Tables = dict[str, Any]
+
+FOLDER = "files"  # below the run directory
+
+
+@frozen
+class Attached:
+    """A file that a part is given, and what a run directory calls its copy."""
+
+    key: str
+    path: Path
+    sum: str  # SHA-256
+
+    @property
+    def kept_as(self) -> str:
+        """The copy's path from the run directory; that of a copy is its own."""
+        start = f"{self.sum[:12]}-"
+        return f"{FOLDER}/{start}{self.path.name.removeprefix(start)}"
+
+
+def attached_to(part: Part) -> list[Attached]:
+    """List the files of a part whose sums are known."""
+    given = part.parameters
+    keys = [(key, sum_key) for key, sum_key in _file_keys(part.kind, part.name) if key in given and sum_key in given]
+    return [Attached(key, Path(given[key]), given[sum_key]) for key, sum_key in keys]
+
+
+def files_of(scene: Scene) -> list[Attached]:
+    """List the files of all parts of a scene."""
+    parts = [scene.solver, *scene.record.observers, *(bond.model for bond in scene.bonds.values())]
+    parts += [scene.repulsion] if scene.repulsion else []
+    parts += scene.wall.sites.values() if scene.wall else []
+    return [file for part in parts for file in attached_to(part)]
 
 
 def attach_files(data: Tables, folder: str | PathLike[str]) -> None:

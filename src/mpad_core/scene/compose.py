@@ -7,14 +7,16 @@ from attrs import evolve
 
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import InputError
+from mpad_core.interfaces.surface import Surface
 from mpad_core.interfaces.values import Configuration, Setting
+from mpad_core.physics.asking import blamed
 from mpad_core.physics.layouts.layout import Layout
 from mpad_core.physics.layouts.uniform import Uniform
 from mpad_core.physics.problem import BondSpecies, CaughtWhen, Effect, Problem, Tolerances
 from mpad_core.physics.questions import check_needs
 from mpad_core.scene.effects import decide
 from mpad_core.scene.site_layouts import layout_of
-from mpad_core.scene.spec import Cell, Group, Scene
+from mpad_core.scene.spec import Cell, Group, Part, Scene
 from mpad_core.units import thermal_energy
 
 _TRIES = 1000  # for each cell placed at random
@@ -118,7 +120,7 @@ def _species(scene: Scene) -> tuple[BondSpecies, ...]:
             name=name,
             site_kind=_site_names(scene).index(bond.between[0]),
             model=bond.model.build(rest_length=bond.length, stiffness=bond.stiffness, kT=kT),
-            surface=scene.wall.sites[bond.between[1]].instance,
+            surface=_surface(scene.wall.sites[bond.between[1]]),
             rest_length=bond.length,
             on_rate=bond.on_rate.value,
             at_density=bond.on_rate.at_density,
@@ -128,6 +130,13 @@ def _species(scene: Scene) -> tuple[BondSpecies, ...]:
         )
         for name, bond in scene.bonds.items()
     )
+
+
+def _surface(part: Part) -> Surface:
+    """Make a surface; a file of its own may have changed since the scene was read."""
+    with blamed(f"surface {part.name!r}"):
+        made: Surface = part.instance
+    return made
 
 
 def _weights(scene: Scene, gravity: Effect, cells: dict[str, Cell | Group]) -> Array:

@@ -6,11 +6,15 @@ import attrs
 import tomli_w
 
 from mpad_core.plugins import registry
+from mpad_core.scene.attached import attached_to
 from mpad_core.scene.spec import PART_KEYS, Condition, Part, Scene
 
 
 def resolved_toml(scene: Scene) -> str:
-    """Write a scene as TOML, complete and exact: read again, it gives an equal scene."""
+    """Write a scene as TOML, complete and exact: read again, it gives an equal scene.
+
+    Files are named as in a run directory, which has copies of them: see `mpad_core.scene.attached`.
+    """
     return tomli_w.dumps(_table(scene))
 
 
@@ -39,4 +43,5 @@ def _part(part: Part) -> dict[str, Any]:
     fields = attrs.fields(registry.load(part.kind, part.name))
     units = {field.alias: field.metadata.get("unit") for field in fields}
     found = {key: _plain(value, units.get(key)) for key, value in part.parameters.items()}
-    return {PART_KEYS.get(part.kind, "name"): part.name} | found | part.written
+    kept = {file.key: file.kept_as for file in attached_to(part)}
+    return {PART_KEYS.get(part.kind, "name"): part.name} | found | part.written | kept

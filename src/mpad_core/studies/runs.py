@@ -1,5 +1,6 @@
 """A scene run from beginning to end: one run, or a passage with its controls and seeds, and what came out of it."""
 
+import hashlib
 import json
 import time
 from collections.abc import Iterator
@@ -21,6 +22,7 @@ from mpad_core.running.recorder import TRAJECTORY, Recording
 from mpad_core.running.run import CHECKPOINT_EVERY, Order, Outcome, run_one
 from mpad_core.running.schedules import Cadence
 from mpad_core.running.stopping import StopWhen
+from mpad_core.scene.attached import files_of
 from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
 from mpad_core.scene.writing import resolved_toml
@@ -72,7 +74,8 @@ def run(
         See `mpad_core.load_scene`.
     directory
         Made if it does not exist. It receives ``trajectory.h5`` (H5MD), ``checkpoint.npz``, ``scene.toml`` (resolved),
-        ``summary.json`` and ``run.jsonl``; a passage adds ``control/``, ``seed-<n>/`` and ``passage.png``.
+        ``summary.json`` and ``run.jsonl``; a passage adds ``control/``, ``seed-<n>/`` and ``passage.png``; files that
+        the scene gives to its parts are copied into ``files/``.
     resume
         Go on with the run that the directory holds.
     checkpoint_every
@@ -97,13 +100,13 @@ def run(
     todo = list(cases(scene))
     _make(root)
     with locked(root):
-        _claim(root, text, resume)
+        _claim(root, scene, text, resume)
         with RunLog(root / LOG) as log:
             began = time.monotonic()
             log.write("started", scene=scene.title, runs=len(todo), resume=resume)
             results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
             summary = _summary(scene, results, time.monotonic() - began)
-            _write_whole(root / SUMMARY, json.dumps(summary, indent=2, ensure_ascii=False) + "\n")
+            _write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
             if scene.passage:
                 _draw(scene, results, root / PICTURE)
             log.write("finished", wall_s=time.monotonic() - began)
@@ -119,23 +122,35 @@ def _make(root: FilePath) -> None:
         ) from error
 
 
-def _claim(root: FilePath, text: str, resume: bool) -> None:
+def _claim(root: FilePath, scene: Scene, text: str, resume: bool) -> None:
     """Make the directory this scene's, or see that it is."""
     there = root / SCENE
     if not there.exists():
         if (root / TRAJECTORY).exists():
             raise InputError(f"{root}: holds a trajectory without its scene; choose another directory with -o")
-        _write_whole(there, text)
+        _keep_files(root, scene)
+        _write_whole(there, text.encode())
     elif not resume:
         raise InputError(f"{root}: holds a run already; add --resume to go on with it, or choose another with -o")
     elif there.read_bytes() != text.encode():
         raise InputError(f"{there}: is of another scene or of other settings; --resume needs the very same scene")
 
 
-def _write_whole(path: FilePath, text: str) -> None:
+def _keep_files(root: FilePath, scene: Scene) -> None:
+    """Copy the files of the scene's parts, which its resolved form names."""
+    for file in files_of(scene):
+        raw = file.path.read_bytes()
+        if hashlib.sha256(raw).hexdigest() != file.sum:
+            raise InputError(f"{file.path}: has changed since the scene was read; start again")
+        copy = root / file.kept_as
+        copy.parent.mkdir(exist_ok=True)
+        _write_whole(copy, raw)
+
+
+def _write_whole(path: FilePath, raw: bytes) -> None:
     """Write a file so that it is there whole or not at all."""
     temporary = path.with_name(path.name + ".tmp")
-    temporary.write_text(text)
+    temporary.write_bytes(raw)
     temporary.replace(path)
 
 
