@@ -120,6 +120,23 @@ def _shares(points: Any, radii: Any) -> Any:
 # In a problem
 
 
+def test_no_draw_serves_twice(problem: Any) -> None:
+    """Not in another sequence, of another kind, on another cell; nor does it matter how a sequence is cut."""
+    given: list[Any] = []
+
+    class Greedy:
+        def directions(self, number: int, radius: float, shell: float, draw: Any) -> Any:
+            given.extend(draw(sequence, 0, 3_500) for sequence in range(3))
+            assert (draw(1, 700, 50) == given[-2][700:750]).all()
+            return np.zeros((number, 3))
+
+    layouts = ((Greedy(), Greedy()),) * 2
+    place_sites(problem([[0, 0, 6], [20, 0, 6]], layouts=layouts, site_densities=np.full((2, 2), 9.0)))
+    everything = np.concatenate(given).ravel()
+    assert len(everything) == 2 * 2 * 3 * 7_000
+    assert len(np.unique(everything)) == len(everything)  # of 2^52: two are equal once in 1.2e6 seeds
+
+
 def test_uniform_molecules_keep_their_bits(problem: Any) -> None:
     """What a cell has had since the first version, written out."""
     asked = problem([[0, 0, 6], [20, 0, 6]], site_densities=np.full((2, 2), 9.0))
