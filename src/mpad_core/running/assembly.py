@@ -15,7 +15,7 @@ from mpad_core.physics.coupling import NOT_FELT, Coupling
 from mpad_core.physics.molecules import identity_of, place_sites
 from mpad_core.physics.problem import BondSpecies, Problem
 from mpad_core.physics.state import BondList, State
-from mpad_core.running.densities import Densities
+from mpad_core.physics.wall_density import Densities
 from mpad_core.running.layout import (
     Bodies,
     Bonds,
@@ -49,7 +49,6 @@ class Fixed:
     thermal: Thermal
     contact_law: Tables
     contact_reach: float  # µm; minus infinity without a law
-    reference_density: Array  # (K,) 1/µm²
     key: np.uint64
 
 
@@ -130,26 +129,8 @@ def assemble(problem: Problem) -> Fixed:
         thermal=Thermal(np.full(1 if problem.thermal_energy > 0 else 0, problem.thermal_energy)),
         contact_law=law,
         contact_reach=reach,
-        reference_density=np.array([s.at_density for s in problem.species]),
         key=key_of(problem.seed),
     )
-
-
-def local_density(problem: Problem, fixed: Fixed, centres: Array) -> Array:
-    """Give the wall's site density under each cell's centre, (N, species), by the one the tables are made for.
-
-    Where the wall's molecules are told apart the tables hold for one molecule, so it is by the densest place's.
-    """
-    ratio = np.ones((len(centres), len(problem.species)))
-    for k, species in enumerate(problem.species):
-        most = species.surface.densest()
-        reference = most if species.reach == "pairs" and most > 0 else fixed.reference_density[k]
-        with blamed(f"surface {species.surface.name!r}"):
-            density = np.asarray(species.surface.density(centres[:, 0], centres[:, 1]), float)
-        if density.shape != (len(centres),) or not ((density >= 0) & (density <= most * (1 + 1e-9))).all():
-            raise PartError(f"surface {species.surface.name!r}: densities must lie from 0 to its densest(), {most:g}")
-        ratio[:, k] = density / reference
-    return ratio
 
 
 def pair_gaps(problem: Problem, pairs: Indices, centres: Array) -> Array:
@@ -167,8 +148,11 @@ def near_pairs(problem: Problem, centres: Array, within: float) -> Indices:
     return pairs[chosen]
 
 
-def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, reach: float) -> System:
-    """Put the frozen coupling and the pairs in contact beside what is fixed; `reach` as in `near_pairs`."""
+def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, reach: float, around: Densities) -> System:
+    """Put the frozen coupling, the pairs in contact and the wall's density beside what is fixed.
+
+    `reach` is what `near_pairs` is asked with, `around` the density around the cells.
+    """
     cells = len(problem.radii)
     place = np.full(cells, -1, np.int64)
     of_group = np.full(cells, len(coupling.groups), np.int64)
@@ -189,17 +173,7 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
     )
     first = np.searchsorted(np.sort(owner), np.arange(len(sizes) + 1))
     contacts = Contacts(fixed.contact_law, fixed.contact_reach, np.ascontiguousarray(pairs), first)
-    ratio = local_density(problem, fixed, state.centres)
-    k = len(problem.species)
-    density = Densities(
-        ratio.ravel().copy(),
-        np.arange(cells * k).reshape(cells, k),
-        np.zeros((cells, k), np.int64),
-        np.zeros((cells, k), np.int64),
-        np.ones((cells, k), np.int64),
-        np.full(k, np.inf),
-    )
-    return System(fixed.bodies, fixed.molecules, fixed.species, contacts, groups, fixed.thermal, density)
+    return System(fixed.bodies, fixed.molecules, fixed.species, contacts, groups, fixed.thermal, around)
 
 
 _BOND_FIELDS = ("site", "species", "state", "partner", "ligand", "anchor")

@@ -13,6 +13,7 @@ from mpad_core.arrays import Array, Flags
 from mpad_core.numerics.compiled import compiled, compiled_lean
 from mpad_core.numerics.streams import Word
 from mpad_core.running.clocks import EARLY, LATE, choice, drawn, share_until, used_until
+from mpad_core.running.densities import holds
 from mpad_core.running.layout import (
     Bonds,
     Candidates,
@@ -306,10 +307,12 @@ def _wait(
 
 
 @compiled_lean
-def _must_end(motion: Motion, limits: Limits) -> bool:
-    """Tell whether the frozen coupling has been used far enough."""
+def _must_end(system: System, motion: Motion, limits: Limits) -> bool:
+    """Tell whether the frozen coupling has been used far enough, or a cell is about to leave what is known of the wall."""
     start = limits.start
     for cell in range(start.shape[0]):
+        if not holds(system.densities, cell, motion.centre[cell, 0], motion.centre[cell, 1]):
+            return True
         if motion.gap[cell] < limits.gap_low[cell] or motion.gap[cell] > limits.gap_high[cell]:
             return True
     for p in range(limits.pairs.shape[0]):
@@ -390,7 +393,7 @@ def burst(
                     return outcome, -1
         progress.beats[0] += 1
         progress.tick[:] = 0
-        ends = _must_end(motion, limits) or progress.beats[0] == limits.most
+        ends = _must_end(system, motion, limits) or progress.beats[0] == limits.most
         if ends or progress.beats[0] % trail.every == 0:
             _note(motion, dice.stride, trail, progress)
         if ends:

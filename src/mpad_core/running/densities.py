@@ -2,11 +2,11 @@
 
 import math
 
-from mpad_core.numerics.compiled import compiled
+from mpad_core.numerics.compiled import compiled_inline, compiled_lean
 from mpad_core.physics.wall_density import Densities
 
 
-@compiled
+@compiled_inline
 def density_at(densities: Densities, cell: int, kind: int, x: float, y: float) -> float:
     """Give the density at a place (µm) near a cell, for a species, by the one that its on-rate is given at.
 
@@ -22,7 +22,7 @@ def density_at(densities: Densities, cell: int, kind: int, x: float, y: float) -
     return float(densities.value[start + i * size + j])
 
 
-@compiled
+@compiled_lean
 def holds(densities: Densities, cell: int, x: float, y: float) -> bool:
     """Tell whether the windows of a cell centred at (x, y), in µm, hold all that its molecules may reach."""
     for kind in range(densities.spacing.shape[0]):

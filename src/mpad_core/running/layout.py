@@ -8,7 +8,7 @@ from typing import NamedTuple
 from mpad_core.arrays import Array, Flags, Indices
 from mpad_core.numerics.streams import Word
 from mpad_core.numerics.tables import Tables
-from mpad_core.running.densities import Densities
+from mpad_core.physics.wall_density import Densities
 
 
 class Bodies(NamedTuple):

@@ -18,6 +18,7 @@ from mpad_core.numerics.tables import value
 from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, coupler, drift_of, lone_velocity
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, Waypoint
+from mpad_core.physics.wall_density import Rasters, rasters
 from mpad_core.running import assembly, pace
 from mpad_core.running.burst import NO_BALANCE, NOT_POSITIVE, ROOM_NEEDED, burst
 from mpad_core.running.layout import Clocks, Dice, Limits, Motion, Progress, Trail
@@ -36,6 +37,7 @@ class Machine:
     pace: pace.Pace
     coupler: Coupler
     drift: Drift
+    rasters: Rasters
 
     def lengths_and_tensions(self, state: State) -> tuple[Array, Array]:
         """Give the length (µm) and tension (pN) of every living bond."""
@@ -62,7 +64,7 @@ def make_ready(problem: Problem, plan: Any = None) -> Machine:
     coupling = coupler(problem, plan)
     return Machine(
         problem=problem, fixed=fixed, pace=pace.choose_pace(problem), coupler=coupling,
-        drift=drift_of(problem, coupling),
+        drift=drift_of(problem, coupling), rasters=rasters(problem, fixed.species.reach),
     )  # fmt: skip
 
 
@@ -125,7 +127,8 @@ class _Done(NamedTuple):
 def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits, stride: int) -> State:
     """Run the burst, with as much room for bonds and events as it needs; make the next state of its outcome."""
     problem, fixed = machine.problem, machine.fixed
-    data = assembly.system(problem, fixed, state, coupling, contact_range(problem))
+    around = machine.rasters.at(state.centres)
+    data = assembly.system(problem, fixed, state, coupling, contact_range(problem), around)
     motion, clocks = assembly.motion_of(state), assembly.clocks_of(state)
     cells = len(state.wall_gaps)
     progress, trail = assembly.progress_of(len(coupling.groups), cells), assembly.trail_for(cells, bounds.most)
