@@ -1,6 +1,7 @@
 """The command line; no logic. Heavy modules are imported inside the commands."""
 
 import os
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -104,6 +105,55 @@ def parts() -> None:
 
     for line in part_lines():
         click.echo(line)
+
+
+def _quantity(name: str, unit: str, say: str, default: str | None = None) -> Callable[[F], F]:
+    """Make an option that is a number and its units, with or without a space between; a float in `unit` inside."""
+
+    def read(context: click.Context, parameter: click.Parameter, text: str | None) -> float | None:
+        from mpad_core.units import UnitsError, convert
+
+        if text is None:
+            return None
+        try:
+            return convert(re.sub(r"(?<=[\d.])(?=[^\d.eE+\-\s])", " ", text, count=1), unit)
+        except UnitsError as error:
+            raise click.BadParameter(str(error)) from error
+
+    return click.option(
+        name, callback=read, metavar="QUANTITY", help=say, default=default, show_default=default is not None
+    )
+
+
+@mpad.command()
+@click.argument("sources", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="RUN|TRACKS.csv...")
+@_quantity("--every", "s", "Interval of the camera; what was recorded if left out.")
+@_quantity("--after", "s", "Leave out what was before.", "0 s")
+@click.option("--by", type=click.Choice(["kind", "cell"]), default="kind", show_default=True, help="What a column is.")
+@click.option("--cell", "cells", multiple=True, metavar="NAME", help="Only this cell; may be given several times.")
+@_quantity("--pause-speed", "um/s", "A pause is slower; half the mean velocity if left out.")
+@_quantity("--pause-time", "s", "A pause lasts longer.", "0.1 s")
+@_quantity("--window", "s", "Time over which deviation from uniform motion is looked at.", "1 s")
+@_quantity("--within", "um", "Distance of neighbours at a capture; ten radii if left out.")
+@_quantity("--free-speed", "um/s", "Of cells in the flow: gives captures in tables of tracks.")
+@_quantity("--length-unit", "um", "What 1 means in a table's x and y, such as 0.65um.")
+@_quantity("--time-unit", "s", "What 1 means in a table's times, such as 33ms for frames.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the draws behind the intervals.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Also write measures.json there, or this file.")
+def measure(sources: tuple[Path, ...], as_json: bool, output: Path | None, **how: Any) -> None:
+    """Measure rolling: velocities, pauses, steps, bonds, captures, each with its 95 % interval.
+
+    Several runs or tables count as several seeds and are pooled.
+    """
+    from mpad_core.studies.measures.asking import asked, json_text, write_report
+    from mpad_core.studies.measures.table import table_lines
+
+    report = asked(sources, **how)
+    for line in [json_text(report)] if as_json else table_lines(report):
+        click.echo(line)
+    if output:
+        click.echo(f"written to {write_report(report, output)}", err=as_json)
 
 
 def main() -> None:

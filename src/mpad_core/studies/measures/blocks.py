@@ -18,7 +18,9 @@ from mpad_core.arrays import Array
 Statistic: TypeAlias = Callable[[Array], Array]  # (..., q) means of a series' columns -> (...)
 
 TIMES_PER_BLOCK = 5  # the variance of a mean is then too small by a tenth for an AR(1) series, its interval by 5 %
-_WINDOW = 5  # correlation times after which the correlation is taken for noise (Sokal, Monte Carlo methods, 1996, ch. 3)
+_WINDOW = (
+    5  # correlation times after which the correlation is taken for noise (Sokal, Monte Carlo methods, 1996, ch. 3)
+)
 _MOST_BLOCKS = 200  # longer blocks lose nothing where there are more of them
 _CHUNK = 2**22  # numbers held at a time
 

@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from attrs import field, frozen
+from attrs import evolve, field, frozen
 from scipy.stats import chi2, norm, t
 
 from mpad_core.arrays import Array
@@ -59,6 +59,8 @@ class Sample:
 
     series: tuple[Array, ...] = field(converter=_rows)  # (n, q) each, equally spaced in time or by event
     statistic: Statistic = _first  # means (..., q) -> (...)
+    least: float = -math.inf  # what the number cannot be below, nor its interval
+    most: float = math.inf
     cells: int = 1
     seeds: int = 1
 
@@ -103,7 +105,8 @@ def estimate(sample: Sample, *, seed: int = 0, name: str = "") -> Estimate:
     """
     if not sample.series:
         return Estimate(math.nan, cells=sample.cells, seeds=sample.seeds)
-    return _with_interval(_draws(sample, seed, name), sample.cells, sample.seeds)
+    found = _with_interval(_draws(sample, seed, name), sample.cells, sample.seeds)
+    return evolve(found, low=max(found.low, sample.least), high=min(found.high, sample.most))
 
 
 def ratio(above: Sample, below: Sample, *, seed: int = 0, name: str = "") -> Estimate:
@@ -174,7 +177,8 @@ def quantile(series: Iterable[Array], share: float, *, cells: int, seeds: int, n
         return Estimate(math.nan, cells=cells, seeds=seeds)
     pooled = np.concatenate(values)
     at = float(np.quantile(pooled, share))
-    below = estimate(Sample(series=[s <= at for s in values], cells=cells, seeds=seeds), name=name)
+    shares = Sample(series=[(s <= at).astype(float) for s in values], least=0.0, most=1.0, cells=cells, seeds=seeds)
+    below = estimate(shares, name=name)
     if not math.isfinite(below.low):
         return Estimate(at, cells=cells, seeds=seeds, blocks=below.blocks)
     low, high = np.quantile(pooled, np.clip([share + below.low - below.value, share + below.high - below.value], 0, 1))
