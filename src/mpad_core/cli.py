@@ -147,7 +147,7 @@ def measure(sources: tuple[Path, ...], as_json: bool, output: Path | None, **how
     Several runs or tables count as several seeds and are pooled.
     """
     from mpad_core.studies.measures.asking import asked, json_text, write_report
-    from mpad_core.studies.measures.table import table_lines
+    from mpad_core.studies.measures.report import table_lines
 
     report = asked(sources, **how)
     for line in [json_text(report)] if as_json else table_lines(report):

@@ -8,8 +8,9 @@ from typing import Any
 
 from mpad_core.interfaces.errors import DiskFullError, InputError
 from mpad_core.records.directory import temporary
+from mpad_core.studies.measures.measure import measure
 from mpad_core.studies.measures.observations import observations
-from mpad_core.studies.measures.table import Options, Report, measure, plain
+from mpad_core.studies.measures.report import Options, Report, plain
 
 REPORT = "measures.json"
 _POSITIVE = ("every", "pause_speed", "pause_time", "window", "within", "free_speed", "length_unit", "time_unit")

@@ -3,14 +3,13 @@
 All of it is of the table of events, which is exact in time; frames are not needed.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from attrs import frozen
 from numpy.typing import NDArray
 
 from mpad_core.arrays import Array
-from mpad_core.records.trajectory import Trajectory
 from mpad_core.studies.measures.estimates import Sample, deviation_of, mean_of, quotient
 
 _FORMED, _BROKEN = 0, 1  # BOND_EVENT's kind
@@ -110,24 +109,29 @@ class CellBonds:
         return integrals
 
 
-def bonds_of(trajectory: Trajectory, times: Array, *, run: str = "", between_cells: bool = False) -> list[CellBonds]:
-    """Give the bonds of every cell of a trajectory: those with the wall, or those with other cells.
+def bonds_of(
+    lives: NDArray[np.void], cells: Sequence[str], times: Mapping[str, Array], *, run: str = "",
+    between_cells: bool = False,
+) -> list[CellBonds]:  # fmt: skip
+    """Give the bonds of some cells: those with the wall, or those with other cells.
 
     Parameters
     ----------
-    trajectory
-        With its bonds recorded.
-    times : (T,)
-        s, edges of the intervals over which numbers of bonds are averaged.
+    lives : (B,) of BOND_LIFE
+        Of all cells of a run, see `lives_of`.
+    cells
+        Names of all cells of the run, in its order.
+    times : (T,) for each cell's name
+        s, edges of the intervals over which numbers of bonds are averaged; cells that are not named are left out.
     run
         Which run it is.
     between_cells
         A bond between cells is one of each of the two.
     """
-    lives = lives_of(trajectory.bond_events)
     return [
-        CellBonds(lives=lives[_of(lives, i, between_cells)], times=times, cell=name, run=run)
-        for i, name in enumerate(trajectory.header.cells)
+        CellBonds(lives=lives[_of(lives, i, between_cells)], times=times[name], cell=name, run=run)
+        for i, name in enumerate(cells)
+        if name in times
     ]
 
 

@@ -2,12 +2,13 @@
 
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from attrs import evolve, field, frozen
+from numpy.typing import NDArray
 
 from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.values import Setting
@@ -42,22 +43,28 @@ class Observation:
     free_speed: Callable[[int, float], float] | None = None  # µm/s, of a cell's index at a time (s)
     rule: CaptureRule = field(factory=CaptureRule)
 
-    def caught(self) -> list[list[Span]]:
-        """Give from when to when each cell is caught; nothing where free speeds are not known."""
+    @cached_property
+    def lives(self) -> NDArray[np.void] | None:
+        """All bonds' lives, (B,) of BOND_LIFE; None where they were not recorded."""
+        known = self.trajectory is not None and "bonds" in self.trajectory.header.quantities
+        return lives_of(self.trajectory.bond_events) if self.trajectory is not None and known else None
+
+    @cached_property
+    def caught(self) -> tuple[tuple[Span, ...], ...]:
+        """From when to when each cell is caught; nothing where free speeds are not known."""
         if self.free_speed is None:
-            return [[] for _ in self.tracks]
-        return [
-            caught_spans(track, self._bound(i), partial(self.free_speed, i), self.rule)
+            return tuple(() for _ in self.tracks)
+        return tuple(
+            tuple(caught_spans(track, self._bound(i), partial(self.free_speed, i), self.rule))
             for i, track in enumerate(self.tracks)
-        ]
+        )
 
     def captures(self) -> list[Capture]:
         """Give all captures, in the order of time."""
-        lives = lives_of(self.trajectory.bond_events) if self.trajectory else None
-        return captures(self.tracks, self.caught(), lives, self.rule)
+        return captures(self.tracks, self.caught, self.lives, self.rule)
 
     def _bound(self, cell: int) -> list[Span] | None:
-        return bound_spans(lives_of(self.trajectory.bond_events), cell) if self.trajectory else None
+        return None if self.lives is None else bound_spans(self.lives, cell)
 
 
 def observed_run(path: Path) -> Observation:

@@ -1,11 +1,8 @@
-"""All that is measured, kind by kind or cell by cell, with what it was measured by."""
+"""All that can be measured on some runs and tables, kind by kind or cell by cell."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Literal, TypeAlias
-
-import numpy as np
-from attrs import asdict, frozen
+from typing import TypeAlias
 
 from mpad_core.interfaces.errors import InputError
 from mpad_core.studies.measures import bonds as of_bonds
@@ -15,52 +12,11 @@ from mpad_core.studies.measures.captures import CLASSES, Capture
 from mpad_core.studies.measures.estimates import Estimate, Sample, estimate, proportion, quantile, rate
 from mpad_core.studies.measures.observations import Observation
 from mpad_core.studies.measures.pauses import PauseRule
+from mpad_core.studies.measures.report import By, Column, Measured, Options, Report
 from mpad_core.studies.measures.tracks import Track, counted, resampled, usual_interval
-
-By: TypeAlias = Literal["kind", "cell"]
-Measured: TypeAlias = tuple[str, str, Estimate]  # what, unit, number
 
 PAUSE_SPEED = 0.5  # of the mean velocity
 _QUANTILES = ((0.1, "10 %"), (0.5, "median"), (0.9, "90 %"))
-
-
-@frozen(kw_only=True)
-class Options:
-    """How to measure; None: as the data suggest, which is told with the result."""
-
-    every: float | None = None  # s, between a camera's frames; None: the usual interval of what was recorded
-    after: float = 0.0  # s, left out
-    by: By = "kind"
-    cells: tuple[str, ...] = ()  # only these; none: all
-    pause_speed: float | None = None  # µm/s; None: half the mean velocity of the cells in a column
-    pause_time: float = 0.1  # s
-    window: float = 1.0  # s, over which the deviation from uniform motion is looked at
-    seed: int = 0  # of the bootstrap
-
-
-@frozen(kw_only=True, eq=False)
-class Column:
-    """What was measured on the cells of one kind, or on one cell of all runs."""
-
-    name: str
-    cells: int
-    seeds: int
-    watched: float  # s, of all cells together
-    pause_rule: PauseRule
-    measured: tuple[Measured, ...]
-    bond_shares: tuple[float, ...] = ()  # of time, with 0, 1, 2, … bonds
-
-
-@frozen(kw_only=True, eq=False)
-class Report:
-    """All columns, all captures, and how they came about."""
-
-    options: Options
-    every: float  # s
-    runs: tuple[str, ...]
-    columns: tuple[Column, ...]
-    captures: tuple[Capture, ...] = ()
-    within: tuple[float, ...] = ()  # µm, R of each run
 
 
 def measure(seen: Sequence[Observation], options: Options) -> Report:
@@ -178,12 +134,11 @@ def _of_bonds(walls: list[CellBonds], between: list[CellBonds], told: Telling) -
 
 def _bonds(tracks: Sequence[Track], seen: Sequence[Observation], between_cells: bool) -> list[CellBonds]:
     """Give the bonds of those cells whose run recorded bonds, averaged over the intervals of their tracks."""
-    recorded = {o.run: o.trajectory for o in seen if o.trajectory and "bonds" in o.trajectory.header.quantities}
     found = []
-    for track in tracks:
-        if track.run in recorded:
-            of_run = bonds_of(recorded[track.run], track.times, run=track.run, between_cells=between_cells)
-            found += [b for b in of_run if b.cell == track.name]
+    for o in seen:
+        mine = {track.name: track.times for track in tracks if track.run == o.run}
+        if mine and o.lives is not None:
+            found += bonds_of(o.lives, [t.name for t in o.tracks], mine, run=o.run, between_cells=between_cells)
     return found
 
 
@@ -201,79 +156,10 @@ def _of_captures(tracks: Sequence[Track], seen: Sequence[Observation], caught: S
 
 def _free_time(tracks: Sequence[Track], seen: Sequence[Observation]) -> float:
     """Add up the time (s) in which the cells were watched and not caught."""
-    spans = {(t.run, t.name): caught for o in seen for t, caught in zip(o.tracks, o.caught(), strict=True)}
+    spans = {(t.run, t.name): caught for o in seen for t, caught in zip(o.tracks, o.caught, strict=True)}
     total = 0.0
     for track in tracks:
         begin, end = track.times[0], track.times[-1]
         held = [max(min(b, end) - max(a, begin), 0.0) for a, b in spans[track.run, track.name]]
         total += end - begin - sum(held)
     return max(float(total), 0.0)
-
-
-def table_lines(report: Report) -> Iterator[str]:
-    """Yield the table that ``mpad measure`` prints."""
-    runs = len(report.runs)
-    yield f"{runs} run{'s' * (runs > 1)}, frames {report.every:g} s apart, 95 % intervals in brackets"
-    rows = list(dict.fromkeys((what, unit) for column in report.columns for what, unit, _ in column.measured))
-    texts = [[f"{what} ({unit})" if unit else what for what, unit in rows], *map(_texts(rows), report.columns)]
-    heads = ["", *(column.name for column in report.columns)]
-    behind = ["watched", *(f"{c.cells} cell{'s' * (c.cells > 1)}, {c.watched:.4g} s" for c in report.columns)]
-    ruled = ["a pause (slower, longer)", *(_rule(c.pause_rule) for c in report.columns)]
-    lines = [heads, behind, ruled, *zip(*texts, strict=True)]
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    for line in lines:
-        yield "  ".join(text.ljust(width) for text, width in zip(line, widths, strict=True)).rstrip()
-    yield from map(_capture_line, report.captures)
-
-
-def _rule(rule: PauseRule) -> str:
-    return f"{rule.slower_than:.3g} um/s, {rule.at_least:.3g} s"
-
-
-def _texts(rows: Sequence[tuple[str, str]]) -> Callable[[Column], list[str]]:
-    def of(column: Column) -> list[str]:
-        known = {(what, unit): number for what, unit, number in column.measured}
-        return [_text(known[row]) if row in known else "" for row in rows]
-
-    return of
-
-
-def _text(number: Estimate) -> str:
-    if not math.isfinite(number.value):
-        return "-"
-    value = f"{number.value:.4g}"
-    return f"{value} [{number.low:.4g}, {number.high:.4g}]" if math.isfinite(number.low) else value
-
-
-def _capture_line(capture: Capture) -> str:
-    near = f"dx = {capture.dx:.1f} um, dy = {capture.dy:.1f} um" if math.isfinite(capture.dx) else "no cell is caught"
-    return f"capture of {capture.cell} at t = {capture.time:.4g} s: {capture.kind}, {near} ({capture.run})"
-
-
-def plain(report: Report) -> dict[str, Any]:
-    """Give the report as JSON knows it; what is no number is null."""
-    return {
-        "runs": list(report.runs),
-        "every_s": report.every,
-        "options": asdict(report.options),
-        "within_um": list(report.within),
-        "columns": [_plain_column(column) for column in report.columns],
-        "captures": [_finite(asdict(capture)) for capture in report.captures],
-    }
-
-
-def _plain_column(column: Column) -> dict[str, Any]:
-    measured = [{"what": what, "unit": unit, **_finite(asdict(number))} for what, unit, number in column.measured]
-    return {
-        "name": column.name,
-        "cells": column.cells,
-        "seeds": column.seeds,
-        "watched_s": column.watched,
-        "pause": asdict(column.pause_rule),
-        "measured": measured,
-        "share_of_time_by_bonds": list(column.bond_shares),
-    }
-
-
-def _finite(values: dict[str, Any]) -> dict[str, Any]:
-    return {name: None if isinstance(v, float) and not np.isfinite(v) else v for name, v in values.items()}
