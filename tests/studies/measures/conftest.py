@@ -94,13 +94,13 @@ def _frame(step, time, place, cells):
 
 @pytest.fixture
 def rolling_run(recorded, rolling_track, events, tmp_path):
-    """Two cells that rest and jump, each held by bonds that come and go: a run directory."""
+    """Two cells that rest and jump, each held by one bond that stays and others that come and go: a run directory."""
     tracks = [rolling_track(seed, duration=20.0, name=f"cell-{seed}") for seed in range(2)]
     places = np.stack([np.stack([t.x, t.y + 20.0 * i], axis=1) for i, t in enumerate(tracks)], axis=1)
-    random, rows = np.random.default_rng(3), []
+    random, rows = np.random.default_rng(3), [(0.0, 0, cell, 1000) for cell in range(2)]
     for cell in range(2):
-        formed = np.sort(random.uniform(0, 20, 100))
-        broken = formed + random.exponential(0.5, 100)
+        formed = np.sort(random.uniform(0, 20, 200))
+        broken = formed + random.exponential(0.5, 200)
         rows += [(t, 0, cell, k) for k, t in enumerate(formed)]
         rows += [(t, 1, cell, k, -1, random.exponential(100.0)) for k, t in enumerate(broken) if t < 20]
     recorded(tmp_path / "rolling", tracks[0].times, places, events(sorted(rows)))

