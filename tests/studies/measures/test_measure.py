@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from attrs import evolve
 
+from mpad_core import load_scene, run
 from mpad_core.records.reader import read_trajectory
 from mpad_core.studies.measures.measure import measure
 from mpad_core.studies.measures.observations import observations
@@ -109,6 +110,18 @@ class TestCaptures:
         times = np.linspace(0, 1, 11)
         recorded(tmp_path, times, np.zeros((11, 1, 2)), events([(0.5, 0, 0, 1)]), scene="")
         assert "captures" not in numbers(measure(observations([tmp_path]), Options()))
+
+
+@pytest.mark.slow
+def test_captures_are_those_that_the_run_tells(tmp_path):
+    """The run says when the while was over, at an outer step; here it is when it began."""
+    quick = ['cells.roller.start.rolling_alone="5 ms"', "passage.control=false"]
+    summary = run(load_scene(ROOT / "examples" / "capture.toml", [*quick, "passage.seeds=2"]), tmp_path)
+    report = measure(observations([tmp_path]), Options(by="cell"))
+    told = [one["cells"]["free"]["caught_at_s"] - 0.1 for one in summary["runs"]]
+    found = {capture.run: capture for capture in report.captures if capture.cell == "free"}
+    assert [found[str(path)].time for path in (tmp_path, tmp_path / "seed-2")] == pytest.approx(told, abs=2e-3)
+    assert [capture.dy for capture in found.values()] == pytest.approx([10.0, 10.0], abs=0.1)
 
 
 class TestCommand:
