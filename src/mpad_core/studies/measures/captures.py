@@ -3,7 +3,7 @@
 The classes are those in which King & Hammer (PNAS 2001, Discussion) report observations in venules of 24 to 30 µm:
 42.8 % of binding events by hydrodynamic recruitment, 6.6 % by adhesion between cells, 22 % isolated, 28.6 % with three
 or more cells. They name no distance. Beside a bound bead of radius 5 µm they saw most attachments upstream at
-−53 ≤ Δx ≤ −18 µm (their figure 2A), and a preponderance 40 µm away; ten radii take these in.
+−53 ≤ Δx ≤ −18 µm (their figure 2A), and a preponderance 40 µm away; ten radii take in all but the farthest.
 """
 
 from collections.abc import Callable, Sequence

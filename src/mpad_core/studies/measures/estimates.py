@@ -156,7 +156,9 @@ def _student(blocks: int) -> float:
     return float(math.sqrt(blocks / (blocks - 1)) * t.ppf(1 - _TAIL, blocks - 1) / norm.ppf(1 - _TAIL))
 
 
-def quantile(series: Iterable[Array], share: float, *, cells: int, seeds: int, name: str = "") -> Estimate:
+def quantile(
+    series: Iterable[Array], share: float, *, cells: int, seeds: int, seed: int = 0, name: str = ""
+) -> Estimate:
     """Give a quantile of values with its interval: that of the share below it, turned back into values.
 
     Parameters
@@ -165,7 +167,7 @@ def quantile(series: Iterable[Array], share: float, *, cells: int, seeds: int, n
         Values, one series a cell and run.
     share
         Which quantile, between 0 and 1.
-    cells, seeds, name
+    cells, seeds, seed, name
         As for `Sample` and `estimate`.
 
     Notes
@@ -178,7 +180,7 @@ def quantile(series: Iterable[Array], share: float, *, cells: int, seeds: int, n
     pooled = np.concatenate(values)
     at = float(np.quantile(pooled, share))
     shares = Sample(series=[(s <= at).astype(float) for s in values], least=0.0, most=1.0, cells=cells, seeds=seeds)
-    below = estimate(shares, name=name)
+    below = estimate(shares, seed=seed, name=name)
     if not math.isfinite(below.low):
         return Estimate(at, cells=cells, seeds=seeds, blocks=below.blocks)
     low, high = np.quantile(pooled, np.clip([share + below.low - below.value, share + below.high - below.value], 0, 1))

@@ -75,7 +75,7 @@ def _column(
     walls, between = _bonds(tracks, seen, False), _bonds(tracks, seen, True)
     measured = [*_of_motion(tracks, told, options), *_of_pauses(tracks, rule, told)]
     if walls:
-        measured += _of_bonds(walls, between, told)
+        measured += _of_bonds(walls, between, told, options.seed)
     measured += _of_captures(tracks, seen, caught)
     return Column(
         name=name,
@@ -119,7 +119,7 @@ def _of_pauses(tracks: Sequence[Track], rule: PauseRule, told: Telling) -> Itera
     yield told("sd of steps", "um", pauses.step_deviation(tracks, rule))
 
 
-def _of_bonds(walls: list[CellBonds], between: list[CellBonds], told: Telling) -> Iterator[Measured]:
+def _of_bonds(walls: list[CellBonds], between: list[CellBonds], told: Telling, seed: int) -> Iterator[Measured]:
     yield told("bonds", "", of_bonds.bond_number(walls))
     yield told("sd of bonds", "", of_bonds.bond_number_deviation(walls))
     if any(len(b.lives) for b in between):
@@ -128,7 +128,7 @@ def _of_bonds(walls: list[CellBonds], between: list[CellBonds], told: Telling) -
     behind = {"cells": len({(b.run, b.cell) for b in walls}), "seeds": len({b.run for b in walls})}
     forces = of_bonds.rupture_forces(walls)
     for share, what in _QUANTILES:
-        yield f"rupture force, {what}", "pN", quantile(forces, share, **behind, name=what)
+        yield f"rupture force, {what}", "pN", quantile(forces, share, **behind, seed=seed, name=what)
     yield told("lifetime of bonds", "s", of_bonds.lifetime(walls))
 
 

@@ -88,8 +88,9 @@ def _texts(rows: Sequence[tuple[str, str]]) -> Callable[[Column], list[str]]:
 def _text(number: Estimate) -> str:
     if not math.isfinite(number.value):
         return "-"
-    value = f"{number.value:.4g}"
-    return f"{value} [{number.low:.4g}, {number.high:.4g}]" if math.isfinite(number.low) else value
+    if math.isfinite(number.low):
+        return f"{number.value:.4g} [{number.low:.4g}, {number.high:.4g}]"
+    return f"{number.value:.0f}" if float(number.value).is_integer() else f"{number.value:.4g}"
 
 
 def _capture_line(capture: Capture) -> str:
