@@ -152,7 +152,8 @@ class TestCommand:
     @pytest.mark.parametrize(("words", "says"), [
         (("--every", "33"), "33"), (("--every", "33 um"), "wrong dimension"), (("--every", "0 s"), "must be above"),
         (("--cell", "x"), "no cell is called 'x'; there are cell-0, cell-1"), (("--seed", "-1"), "--seed"),
-        (("--after", "1 h"), "nothing can be measured"), (("-o", "no/where.json"), "cannot be written"),
+        (("--after", "1 h"), "nothing can be measured"),
+        (("--every", "1 ns"), "choose a longer interval"), (("-o", "no/where.json"), "cannot be written"),
     ])  # fmt: skip
     def test_what_cannot_be_measured_ends_with_code_2(self, words, says, rolling_run, mpad):
         code, _, err = mpad("measure", rolling_run, *words)

@@ -15,6 +15,7 @@ from mpad_core.studies.measures.pauses import PauseRule
 from mpad_core.studies.measures.report import By, Column, Measured, Options, Report
 from mpad_core.studies.measures.tracks import Track, counted, resampled, usual_interval
 
+MOST_FRAMES = 1e7  # of all cells: about a gigabyte
 PAUSE_SPEED = 0.5  # of the mean velocity
 _QUANTILES = ((0.1, "10 %"), (0.5, "median"), (0.9, "90 %"))
 
@@ -37,6 +38,7 @@ def measure(seen: Sequence[Observation], options: Options) -> Report:
     tracks = [track for o in seen for track in o.tracks if not options.cells or track.name in options.cells]
     _check_names(seen, options.cells)
     every = options.every or usual_interval(tracks)
+    _check_size(tracks, every)
     filmed = [resampled(track, every, after=options.after) for track in tracks] if math.isfinite(every) else []
     filmed = [track for track in filmed if len(track) > 1]
     if not filmed:
@@ -52,6 +54,13 @@ def measure(seen: Sequence[Observation], options: Options) -> Report:
         captures=tuple(caught),
         within=tuple(o.rule.within for o in seen),
     )  # fmt: skip
+
+
+def _check_size(tracks: Sequence[Track], every: float) -> None:
+    frames = sum((track.times[-1] - track.times[0]) / every for track in tracks if len(track))
+    if frames > MOST_FRAMES:
+        raise InputError(f"frames {every:g} s apart are {frames:.3g} of all cells, more than {MOST_FRAMES:.0e}; "
+                         "choose a longer interval with --every, or fewer cells")  # fmt: skip
 
 
 def _check_names(seen: Sequence[Observation], wanted: Sequence[str]) -> None:

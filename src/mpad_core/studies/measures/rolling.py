@@ -30,9 +30,14 @@ def fluctuation(tracks: Sequence[Track]) -> Sample:
 
 
 def relative_fluctuation(tracks: Sequence[Track]) -> Sample:
-    """Give the standard deviation of the velocity by its mean."""
+    """Give the standard deviation of the velocity by the mean's magnitude."""
     series = [np.stack([_velocities(t), _velocities(t) ** 2], axis=1) for t in tracks]
-    return Sample(series=series, statistic=lambda mean: deviation_of(mean) / mean[..., 0], **counted(tracks))
+
+    def relative(mean: Array) -> Array:
+        found: Array = deviation_of(mean) / np.abs(mean[..., 0])
+        return found
+
+    return Sample(series=series, statistic=relative, least=0.0, **counted(tracks))
 
 
 def deviation(tracks: Sequence[Track], window: float, *, across: bool = False) -> Sample:
