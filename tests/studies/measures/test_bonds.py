@@ -86,6 +86,7 @@ def test_bonds_between_cells_are_counted_apart_and_for_both(lives, wall):
 def test_forces_and_lifetimes(wall):
     assert [f.tolist() for f in rupture_forces(wall)] == [[30, 50], []]
     assert rupture_force(wall).value() == 40
+    assert lifetime(wall).series[0].tolist() == [[3.0, 1.0], [2.5, 1.0]]  # one broke just at 2 s, an interval's end
     assert lifetime(wall).value() == pytest.approx(8 / 2)  # 8 s of bonds were seen, two of which broke
 
 

@@ -39,7 +39,7 @@ class TestCaught:
         assert span == (pytest.approx(0.55), 0.9)
 
     def test_not_bound_for_long_enough(self):
-        assert caught_spans(arriving("a", 0.5, 0.0), [(0.5, 0.59), (0.6, 0.69)], free, RULE) == []
+        assert caught_spans(arriving("a", 0.5, 0.0), [(0.5, 0.599), (0.6, 0.699)], free, RULE) == []
         assert caught_spans(arriving("a", 0.5, 0.0), [(0.95, math.inf)], free, RULE) == []
 
     def test_caught_again(self):
@@ -53,7 +53,7 @@ class TestCaught:
 
     def test_spans_of_bonds_with_the_wall(self, events):
         rows = [(0.0, FORMED, 0, 1), (1.0, FORMED, 0, 2), (2.0, BROKEN, 0, 1), (3.0, BROKEN, 0, 2), (4.0, FORMED, 0, 1),
-                (0.5, FORMED, 1, 1), (0.2, FORMED, 0, 9, 1)]  # fmt: skip
+                (0.5, FORMED, 1, 1), (0.2, FORMED, 0, 9, 1), (1.2, FORMED, 0, 3), (1.4, BROKEN, 0, 3)]  # fmt: skip
         lives = lives_of(events(sorted(rows)))
         assert bound_spans(lives, 0) == [(0.0, 3.0), (4.0, math.inf)]
         assert bound_spans(lives, 1) == [(0.5, math.inf)]

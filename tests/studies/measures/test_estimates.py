@@ -52,10 +52,10 @@ class TestCoverage:
         assert 0.90 < share < 0.98
 
     def test_of_cells_that_differ(self):
-        """Each cell has a mean of its own: the interval is of the mean of all such cells, not of these eight."""
+        """Each cell has a mean of its own: the interval is of the mean of all such cells, not of these five."""
 
         def cells(k):
-            offsets = np.random.default_rng([12, k]).normal(size=8)
+            offsets = np.random.default_rng([12, k]).normal(size=5)
             return Sample(series=[offset + 0.2 * autoregressive(60, 0.3, k, c) for c, offset in enumerate(offsets)])
 
         assert 0.90 < coverage(cells, 0.0) < 0.98

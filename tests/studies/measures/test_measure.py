@@ -52,9 +52,9 @@ def test_a_run_and_its_table_give_the_same_numbers(rolling_run, tmp_path):
 
 def test_seeds_are_pooled(rolling_run, tmp_path):
     seed = rolling_run / "seed-2"
-    seed.mkdir()
-    shutil.copy(rolling_run / "trajectory.h5", seed)
-    (rolling_run / "control").mkdir()
+    for folder in (seed, rolling_run / "control"):
+        folder.mkdir()
+        shutil.copy(rolling_run / "trajectory.h5", folder)
     one, both = (measure(observations([path]), Options(every=0.033)) for path in (seed, rolling_run))
     assert both.runs == (str(rolling_run), str(seed))
     first, pooled = numbers(one)["rolling velocity"], numbers(both)["rolling velocity"]

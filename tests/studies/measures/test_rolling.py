@@ -46,6 +46,7 @@ class TestUniformMotion:
         assert rolling.fluctuation(self.uniform).value() < 1e-6
         assert rolling.deviation(self.uniform, 1.0).value() < 1e-12
         assert rolling.deviation(self.uniform, 1.0, across=True).value() < 1e-12
+        assert rolling.deviation([track(np.full(50, 20.1))], 1.0).value() < 1e-14
 
     def test_no_pause(self):
         assert pause_count(self.uniform, RULE) == 0
@@ -89,6 +90,12 @@ class TestWhatIsWorkedOutByHand:
         assert pause_rate(found, rule).value() == pytest.approx(3 / 1.3)
         assert step_size(found, rule).value() == 2
         assert step_deviation(found, rule).value() == 0
+
+    def test_a_while_of_whole_frames_is_not_rounded_up_for_its_last_digit(self):
+        """2.1 s are three intervals of 0.7 s, though their quotient is 3.0000000000000004."""
+        x = [0, 5, 5, 5, 5, 10, 15, 20, 25]
+        assert pause_count([track(x, every=0.7)], PauseRule(slower_than=1.0, at_least=2.1)) == 1
+        assert pause_count([track(x, every=0.7)], PauseRule(slower_than=1.0, at_least=2.11)) == 0
 
     def test_noise_below_the_threshold_does_not_end_a_pause(self):
         noise = 0.04 * np.random.default_rng(1).uniform(-1, 1, size=500)  # up to 8 um/s from frame to frame at 10 ms

@@ -95,8 +95,7 @@ class CellBonds:
         ends = self.lives["broken"][np.isfinite(self.lives["broken"])]
         change = np.repeat([0, 1, -1], [1, len(self.lives), len(ends)])
         times = np.concatenate([self.times[:1], self.lives["formed"], ends])
-        # at one moment bonds form first: a number below zero, for no time, would still be a number of bonds
-        order = np.lexsort((-change, times))
+        order = np.argsort(times, kind="stable")
         return np.clip(times[order], self.times[0], self.times[-1]), np.cumsum(change[order])
 
     def _integrals(self, what: Callable[[NDArray[np.int64]], Array]) -> Array:

@@ -78,7 +78,7 @@ def _squares(place: Array, frames: int) -> Array:
     if not windows:
         return np.empty(0)
     base = np.linalg.qr(np.vander(np.linspace(-1, 1, frames), 2))[0]
-    rows = rows - rows.mean(axis=1, keepdims=True)  # first, since far from the origin digits would be lost
+    rows = rows - rows.mean(axis=1, keepdims=True)  # first: what does not move has no deviation, to the last digit
     left = rows - rows @ base @ base.T
     squares: Array = np.sum(left**2, axis=1) / max(frames - 2, 1)
     return squares
