@@ -1,6 +1,6 @@
 """The state of a run: all that going on needs, and nothing that can be worked out again."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import attrs
@@ -49,10 +49,29 @@ class Waypoint:
     orientations: Array
     drift: Array  # (N, 6) mean velocity since the waypoint before
 
-    @classmethod
-    def start(cls, state: "State") -> "Waypoint":
-        """Give where a way begins."""
-        return cls(**{name: getattr(state, name) for name in attrs.fields_dict(cls)})
+
+@frozen(kw_only=True, eq=False)
+class Way:
+    """The way of an outer step: W places of N cells, the last of them where it ends."""
+
+    steps: Indices  # (W,)
+    times: Array  # (W,) s
+    centres: Array  # (W, N, 3) µm
+    wall_gaps: Array  # (W, N)
+    orientations: Array  # (W, N, 4)
+    turns: Array  # (W, N, 3) angular velocity, integrated over time since the way began
+
+    def points(self, start: "State") -> Iterator[Waypoint]:
+        """Yield its places; `start` is the state where it began."""
+        time, centres, turns = start.time, start.centres, np.zeros_like(start.centres)
+        for k in range(len(self.steps)):
+            moved = np.concatenate([self.centres[k] - centres, self.turns[k] - turns], axis=1)
+            drift = moved / (self.times[k] - time)
+            time, centres, turns = float(self.times[k]), self.centres[k], self.turns[k]
+            yield Waypoint(
+                step=int(self.steps[k]), time=time, centres=centres, wall_gaps=self.wall_gaps[k],
+                orientations=self.orientations[k], drift=drift,
+            )  # fmt: skip
 
 
 @frozen(kw_only=True, eq=False)
@@ -76,7 +95,7 @@ class State:
     caught_since: Array  # (N,) s; infinite until the cell is caught
     guess: Array | None = None  # of the solver
     events: Any = field(factory=_no_events)  # bond events of the last outer step; not part of what going on needs
-    trail: tuple[Waypoint, ...] = ()  # the way of the last outer step, this state its end; neither
+    way: Way | None = None  # of the last outer step; neither is this
 
     def bond_counts(self) -> Indices:
         """Give each cell's number of living bonds."""
@@ -85,7 +104,7 @@ class State:
 
 def to_arrays(state: State) -> dict[str, Any]:
     """Give the state as named arrays, for a checkpoint."""
-    named = attrs.asdict(state, recurse=False, filter=lambda a, _: a.name not in ("bonds", "events", "trail", "guess"))
+    named = attrs.asdict(state, recurse=False, filter=lambda a, _: a.name not in ("bonds", "events", "way", "guess"))
     arrays = {f"state.{name}": np.asarray(value) for name, value in named.items()}
     arrays |= {f"bonds.{name}": value for name, value in attrs.asdict(state.bonds).items()}
     return arrays if state.guess is None else arrays | {"guess": state.guess}

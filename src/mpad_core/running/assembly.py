@@ -142,6 +142,8 @@ def pair_gaps(problem: Problem, pairs: Indices, centres: Array) -> Array:
 
 def near_pairs(problem: Problem, centres: Array, within: float) -> Indices:
     """List the pairs of cells, not both held, whose smooth gap is below `within` (µm): (P, 2), ascending."""
+    if len(problem.radii) == 1 or within == -np.inf:
+        return np.zeros((0, 2), np.int64)
     i, j = np.triu_indices(len(problem.radii), 1)
     pairs = np.stack([i, j], axis=1).astype(np.int64)
     chosen = (pair_gaps(problem, pairs, centres) < within) & ~(problem.held[i] & problem.held[j])

@@ -56,7 +56,7 @@ def _bond_counts(before: State, after: State, time: float) -> Any:
 def frames(problem: Problem, hazards: Hazards, schedule: Schedule, before: State, after: State) -> Iterator[Frame]:
     """Yield the frames that are due between two states, from waypoint to waypoint."""
     start: State | Waypoint = before
-    for point in after.trail or (after,):
+    for point in after.way.points(before) if after.way else (after,):
         for share in schedule.due(problem, start, point):
             step = start.step + round(share * (point.step - start.step)) - after.zero
             counts = _bond_counts(before, after, start.time + share * (point.time - start.time))

@@ -17,7 +17,7 @@ from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.tables import value
 from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, coupler, drift_of, lone_velocity
 from mpad_core.physics.problem import Problem
-from mpad_core.physics.state import BondList, State, Waypoint
+from mpad_core.physics.state import BondList, State, Way
 from mpad_core.physics.wall_density import Rasters, rasters
 from mpad_core.running import assembly, pace
 from mpad_core.running.burst import NO_BALANCE, NOT_POSITIVE, ROOM_NEEDED, burst
@@ -180,7 +180,7 @@ def _next(machine: Machine, state: State, made: _Done, coupling: Coupling, strid
         draws=made.clocks.count.astype(float),
         guess=coupling.guess,
         events=_in_order(made.events, state.zero, stride, machine.pace.grain),
-        trail=tuple(_waypoints(state, made, machine.pace.grain)),
+        way=_way(state, made, machine.pace.grain),
     )
     return _with_captures(machine.problem, following)
 
@@ -192,18 +192,14 @@ def _in_order(events: Any, zero: int, stride: int, grain: float) -> Any:
     return events[np.argsort(events["time"], kind="stable")]
 
 
-def _waypoints(state: State, made: _Done, grain: float) -> Iterator[Waypoint]:
-    """Yield the places that the burst has noted, its end last."""
-    before, trail = Waypoint.start(state), made.trail
-    turn = np.zeros((len(state.wall_gaps), 3))
-    for k in range(int(made.progress.trail[0])):
-        step = state.step + int(trail.step[k])
-        moved = np.concatenate([trail.centre[k] - before.centres, trail.turn[k] - turn], axis=1)
-        before, turn = Waypoint(
-            step=step, time=(step - state.zero) * grain, centres=trail.centre[k], wall_gaps=trail.gap[k],
-            orientations=trail.orientation[k], drift=moved / ((step - before.step) * grain),
-        ), trail.turn[k]  # fmt: skip
-        yield before
+def _way(state: State, made: _Done, grain: float) -> Way:
+    """Give the places that the burst has noted, its end last."""
+    noted, trail = int(made.progress.trail[0]), made.trail
+    steps = state.step + trail.step[:noted]
+    return Way(
+        steps=steps, times=(steps - state.zero) * grain, centres=trail.centre[:noted], wall_gaps=trail.gap[:noted],
+        orientations=trail.orientation[:noted], turns=trail.turn[:noted],
+    )  # fmt: skip
 
 
 def _with_captures(problem: Problem, state: State) -> State:
