@@ -34,14 +34,18 @@ class BondModel(Protocol):
 
 @runtime_checkable
 class Interconverting(Protocol):
-    """A bond with inner states, each with its own off-rate."""
+    """A bond model with inner states, each with its own off-rate; state 0 is the one that the others are weighed by.
+
+    Its ``off_rate(length)`` gives (states, ...), and so does its ``on_rate(length)`` if it has one. The tension is that
+    of any state.
+    """
 
     def states(self) -> int:
         """Give the number of inner states."""
         ...
 
     def exchange(self, length: Array) -> Array:
-        """Give the exchange rates (1/s) between inner states as (states, states, ...)."""
+        """Give the exchange rates (1/s) as (states, states, ...): row = from, column = to, the diagonal zero."""
         ...
 
 

@@ -4,6 +4,17 @@ The on-rate follows from the off-rate and the elastic energy E (King & Hammer, P
 the binding affinity"):  k_on(x) = k_on(λ) · k_off(x) / k_off(λ) · exp(−E(x) / kT), so k_on / k_off = K exp(−E / kT) at
 every length, whatever the model. Slack bonds have no tension and no energy below the unstressed length λ; linear ones
 push there.
+
+A bond with inner states s = 0 … S − 1, exchange rates X_st(x) between them and an off-rate of each may also form in
+each. At a fixed length the free pair and the S bound states are a chain with S ways of binding. It is in detailed
+balance if there are equilibrium shares P with P_free on_s = P_s off_s and P_s X_st = P_t X_ts for all s and t. The
+second set gives P_s = w_s P_0 with w_s = X_0s / X_s0 (along a way from state to state where X_0s is zero), the first one
+then on_s / off_s = w_s P_0 / P_free, and P_0 / P_free = K exp(−E / kT) as for a bond without inner states: E is the
+energy of state 0, and −kT ln w_s what state s lies above it. K is fixed by what the scene says, Σ_s on_s(λ) = k_on. So
+
+    on_s(x) = k_on · off_s(x) w_s(x) exp(−E(x) / kT) / Σ_t off_t(λ) w_t(λ).
+
+With one state this is the line above.
 """
 
 from itertools import pairwise
@@ -13,8 +24,10 @@ from attrs import evolve, frozen
 from numpy.polynomial.legendre import leggauss
 
 from mpad_core.arrays import Array
+from mpad_core.interfaces.bonds import Interconverting
 from mpad_core.interfaces.errors import PartError
 from mpad_core.numerics.tables import Tables, tabulate
+from mpad_core.physics import inner_states
 from mpad_core.physics.asking import blamed
 from mpad_core.physics.problem import BondSpecies
 
@@ -43,9 +56,49 @@ class BondLaw:
         slack = (self.species.compression == "slack") & (length < self.species.rest_length)
         return np.where(slack, 0.0, tension)
 
-    def off_rate(self, length: Array) -> Array:
-        """Give the rate of breaking (1/s)."""
-        return np.asarray(self.species.model.off_rate(self._felt(length)), float) + np.zeros_like(length)
+    def states(self) -> int:
+        """Give the number of inner states; one for a model that has none."""
+        model = self.species.model
+        return int(model.states()) if isinstance(model, Interconverting) else 1
+
+    def _who(self) -> str:
+        return f"bond model {self.species.model.name!r} of bond {self.species.name!r}"
+
+    def _asked(self, member: str, length: Array, *axes: int) -> Array:
+        """Ask the model for rates, with leading axes that a model without inner states may leave out."""
+        rates = np.asarray(getattr(self.species.model, member)(self._felt(length)), float)
+        if self.states() > 1 and rates.shape != (*axes, *np.shape(length)):
+            wanted = (*axes, *np.shape(length))
+            raise PartError(f"{self._who()}: {member}() gives shape {rates.shape} with inner states, not {wanted}")
+        return np.broadcast_to(rates, (*axes, *np.shape(length)))
+
+    def off_rates(self, length: Array) -> Array:
+        """Give the rates of breaking (1/s) from each inner state, (S, ...)."""
+        return self._asked("off_rate", length, self.states())
+
+    def off_rate(self, length: Array, state: int = 0) -> Array:
+        """Give the rate of breaking (1/s) from an inner state."""
+        rate: Array = self.off_rates(length)[state]
+        return rate
+
+    def exchange(self, length: Array) -> Array:
+        """Give the rates (1/s) between inner states, (S, S, ...), row = from, column = to."""
+        if self.states() == 1:
+            return np.zeros((1, 1, *np.shape(length)))
+        rates = self._asked("exchange", length, self.states(), self.states())
+        if np.einsum("ss...->s...", rates).any():
+            raise PartError(f"{self._who()}: exchange() has a diagonal that is not zero")
+        return rates
+
+    def _log_weights(self, length: Array) -> Array:
+        """Give ln w_s (S, ...), how the exchange weighs the states against state 0."""
+        if self.states() == 1:
+            return np.zeros((1, *np.shape(length)))
+        at_rest = self.exchange(np.array([self.species.rest_length]))[..., 0]
+        exchange = self.exchange(length)
+        weights = inner_states.log_weights(exchange, inner_states.links(at_rest, self._who()))
+        inner_states.check_balance(exchange, weights, self._who())
+        return weights
 
     def energy(self, length: Array) -> Array:
         """Give the elastic energy (pN µm): the tension integrated from the unstressed length."""
@@ -60,15 +113,30 @@ class BondLaw:
             total = total + half * (self.tension(places) @ _WEIGHTS)
         return total
 
-    def on_rate(self, length: Array) -> Array:
-        """Give the rate of formation (1/s) at the wall's reference density, without regard to reach."""
-        own = getattr(self.species.model, "on_rate", None)
-        if own is not None:
-            return np.asarray(own(self._felt(length)), float) + np.zeros_like(length)
-        at_rest = float(self.off_rate(np.array([self.species.rest_length]))[0])
-        ratio = self.off_rate(length) / at_rest if at_rest > 0 else 1.0
-        balanced: Array = self.species.on_rate * ratio * np.exp(-self.energy(length) / self.species.kT)
+    def on_rates(self, length: Array) -> Array:
+        """Give the rates of formation (1/s) into each inner state, (S, ...), at the wall's reference density.
+
+        Without regard to reach.
+
+        Raises
+        ------
+        PartError
+            If the exchange between inner states keeps no detailed balance, or leaves out a state.
+        """
+        if hasattr(self.species.model, "on_rate"):
+            return self._asked("on_rate", length, self.states())
+        rest = np.array([self.species.rest_length])
+        off, at_rest = self.off_rates(length), float((self.off_rates(rest) * np.exp(self._log_weights(rest))).sum())
+        if not at_rest > 0:  # never breaks: as if all states did so at one rate
+            off, at_rest = np.ones_like(off), float(np.exp(self._log_weights(rest)).sum())
+        boltzmann = np.exp(self._log_weights(length) - self.energy(length) / self.species.kT)
+        balanced: Array = self.species.on_rate * (off / at_rest) * boltzmann
         return balanced
+
+    def on_rate(self, length: Array) -> Array:
+        """Give the rate of formation (1/s) into any inner state, as `on_rates`."""
+        rate: Array = self.on_rates(length).sum(axis=0)
+        return rate
 
     def binding_lengths(self) -> tuple[float, float]:
         """Give the lengths (µm) between which bonds form; beyond, the on-rate is negligible, or has not been asked.
@@ -93,49 +161,64 @@ class BondLaw:
         """Give the length (µm) beyond which no bond forms."""
         return self.binding_lengths()[1]
 
-    def _bounded(self, lengths: Array) -> float:
-        """Give the last of the lengths, walking away from rest, at which the bond is of any consequence."""
+    def _bounded(self, lengths: Array, state: int) -> float:
+        """Give the last of the lengths, walking away from rest, at which the bond in a state is of any consequence."""
         with np.errstate(over="ignore", invalid="ignore"):
-            rates, tensions = self.off_rate(lengths), np.abs(self.tension(lengths))
-        if (np.isnan(rates) & (tensions < _MODEST)).any():  # far beyond, 0 · exp(…) may overflow to one
+            rates, tensions = self.off_rate(lengths, state), np.abs(self.tension(lengths))
+            leaving = rates + self.exchange(lengths)[state].sum(axis=0)
+        if (np.isnan(leaving) & (tensions < _MODEST)).any():  # far beyond, 0 · exp(…) may overflow to one
             raise PartError(f"bond model {self.species.model.name!r} gives an off-rate that is not a number")
-        tame = (rates < _INSTANT) & (tensions < _STRONG)
+        tame = (leaving < _INSTANT) & (tensions < _STRONG)
         return float(lengths[-1] if tame.all() else lengths[max(int(np.argmin(tame)) - 1, 1)])
 
-    def edges(self) -> list[float]:
-        """Give the ends and the breakpoints of the tables."""
+    def edges(self, state: int = 0) -> list[float]:
+        """Give the ends and the breakpoints of the tables of an inner state."""
         rest = self.species.rest_length
         nearest, reach = self.binding_lengths()
         steps = np.concatenate([[0.0], np.geomspace(1e-4, _FARTHEST, 2000)])
-        top = max(self._bounded(rest * (1 + steps)), reach * (1 + 1e-9), rest * (1 + 1e-3))
+        top = max(self._bounded(rest * (1 + steps), state), reach * (1 + 1e-9), rest * (1 + 1e-3))
         bottom = 0.0
         if self.species.compression == "linear":
-            bottom = self._bounded(np.maximum(rest * (1 - steps), 0.0))
+            bottom = self._bounded(np.maximum(rest * (1 - steps), 0.0), state)
         inner = {rest, nearest, reach, *self.species.model.breakpoints()}
         return [bottom, *sorted(b for b in inner if bottom < b < top), top]
 
-    def tables(self) -> Tables:
-        """Tabulate tension, off-rate and on-rate (zero beyond reach), good to `TABLE_ERROR`.
+    def tables(self, exchange_columns: int = 0) -> list[Tables]:
+        """Tabulate the law for each inner state, good to `TABLE_ERROR`.
+
+        Parameters
+        ----------
+        exchange_columns
+            The least number of columns for exchange, those of states that this model does not have being zero.
+
+        Returns
+        -------
+        For each inner state a table with columns tension (pN), off-rate (1/s), on-rate into the state (1/s, zero beyond
+        reach), and for a model with inner states, or where asked for, the exchange rates (1/s) to states 0, 1, …
 
         Raises
         ------
         PartError
-            If a table cannot follow the model.
+            If a table cannot follow the model, a rate is negative, or inner states keep no detailed balance.
         """
-        with blamed(f"bond model {self.species.model.name!r} of bond {self.species.name!r}"):
-            return self._tabulated()
+        columns = max(exchange_columns, self.states() if self.states() > 1 else 0)
+        with blamed(self._who()):
+            return [self._tabulated(state, columns) for state in range(self.states())]
 
-    def _tabulated(self) -> Tables:
+    def _tabulated(self, state: int, exchange_columns: int) -> Tables:
         nearest, reach = self.binding_lengths()
 
         def on_rate(length: Array) -> Array:
             within = (length >= nearest) & (length <= reach)
-            return np.where(within, self.on_rate(np.clip(length, nearest, reach)), 0.0)
+            return np.where(within, self.on_rates(np.clip(length, nearest, reach))[state], 0.0)
 
-        tables = tabulate([self.tension, self.off_rate, on_rate], self.edges(), error=TABLE_ERROR, tangents=[0])
+        rates = [lambda x: self.off_rate(x, state), on_rate]
+        rates += [lambda x, to=to: self.exchange(x)[state, to] for to in range(self.states())][:exchange_columns]
+        tables = tabulate([self.tension, *rates], self.edges(state), error=TABLE_ERROR, tangents=[0])
         if (tables.coefficients[:, 1:, 0] < 0).any():
-            raise PartError(f"bond model {self.species.model.name!r} of bond {self.species.name!r} has a negative rate")
-        return tables
+            raise PartError(f"{self._who()} has a negative rate")
+        lacking = 3 + exchange_columns - tables.coefficients.shape[1]
+        return tables._replace(coefficients=np.pad(tables.coefficients, ((0, 0), (0, lacking), (0, 0))))
 
 
 @frozen(kw_only=True, eq=False)

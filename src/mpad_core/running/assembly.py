@@ -68,9 +68,11 @@ def _species(problem: Problem) -> Species:
     laws = [BondLaw(species=species) for species in problem.species]
     # in the reading "overlap" a bond that would push if it stood upright is born unstressed, hence tilted
     tilted = [s.reach == "overlap" and s.compression == "linear" for s in problem.species]
-    tables = [[law.tables()] for law in laws]
+    most = max(law.states() for law in laws)
+    exchanges = most if most > 1 else 0
+    tables = [law.tables(exchanges) for law in laws]
     return Species(
-        tables=together([table for own in tables for table in own], 3),
+        tables=together([table for own in tables for table in own], 3 + exchanges),
         first=np.cumsum([0, *(len(own) for own in tables)]),
         site_kind=np.array([s.site_kind for s in problem.species], np.int64),
         partner_kind=np.full(len(laws), -1, np.int64),
