@@ -8,8 +8,8 @@ push there.
 A bond with inner states s = 0 … S − 1, exchange rates X_st(x) between them and an off-rate of each may also form in
 each. At a fixed length the free pair and the S bound states are a chain with S ways of binding. It is in detailed
 balance if there are equilibrium shares P with P_free on_s = P_s off_s and P_s X_st = P_t X_ts for all s and t. The
-second set gives P_s = w_s P_0 with w_s = X_0s / X_s0 (along a way from state to state where X_0s is zero), the first one
-then on_s / off_s = w_s P_0 / P_free, and P_0 / P_free = K exp(−E / kT) as for a bond without inner states: E is the
+second set gives P_s = w_s P_0 with w_s = X_0s / X_s0 (along a way from state to state where X_0s is zero), the first
+one then on_s / off_s = w_s P_0 / P_free, and P_0 / P_free = K exp(−E / kT) as for a bond without inner states: E is the
 energy of state 0, and −kT ln w_s what state s lies above it. K is fixed by what the scene says, Σ_s on_s(λ) = k_on. So
 
     on_s(x) = k_on · off_s(x) w_s(x) exp(−E(x) / kT) / Σ_t off_t(λ) w_t(λ).
