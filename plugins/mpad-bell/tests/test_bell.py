@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpad_bell import Bell
+from mpad_bell.bell import Bell
 from mpad_core.plugins.registry import load
 from mpad_core.testing import BondModelContract
 

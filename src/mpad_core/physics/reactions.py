@@ -26,18 +26,21 @@ from numpy.polynomial.legendre import leggauss
 from mpad_core.arrays import Array
 from mpad_core.interfaces.bonds import Interconverting
 from mpad_core.interfaces.errors import PartError
-from mpad_core.numerics.tables import Tables, tabulate
+from mpad_core.numerics.tables import Function, Tables, tabulate
 from mpad_core.physics import inner_states
 from mpad_core.physics.asking import blamed
 from mpad_core.physics.problem import BondSpecies
 
 TABLE_ERROR = 1e-6
+NEVER = 1e-12  # 1/s, once in 30 000 years: rates that have fallen below are tabulated as none
 _NEGLIGIBLE = 1e-9  # of the unstressed on-rate: beyond, no bond forms
 _FALLEN = 1e-3  # of its largest value: an on-rate that has fallen so far at ten rest lengths has a reach of its own
 _INSTANT = 1e8  # 1/s: a bond that breaks faster does not live through any sub-step
+_OVERFLOW = 1e200  # 1/s: a state's table ends where the others' off-rates, asked for with its own, come near infinity
 _STRONG = 1e6  # pN: no bond of any cell comes near
 _MODEST = 1e3  # pN: any model must give a rate at such a tension
 _FARTHEST = 30.0  # rest lengths; tables end here at the latest, and go on by their tangent
+_STEPS = np.concatenate([[0.0], np.geomspace(1e-4, _FARTHEST, 2000)])  # of the rest length, away from it
 _POINTS, _WEIGHTS = leggauss(24)
 
 
@@ -164,23 +167,43 @@ class BondLaw:
     def _bounded(self, lengths: Array, state: int) -> float:
         """Give the last of the lengths, walking away from rest, at which the bond in a state is of any consequence."""
         with np.errstate(over="ignore", invalid="ignore"):
-            rates, tensions = self.off_rate(lengths, state), np.abs(self.tension(lengths))
-            leaving = rates + self.exchange(lengths)[state].sum(axis=0)
+            rates, tensions = self.off_rates(lengths), np.abs(self.tension(lengths))
+            leaving = rates[state] + self.exchange(lengths)[state].sum(axis=0)
         if (np.isnan(leaving) & (tensions < _MODEST)).any():  # far beyond, 0 · exp(…) may overflow to one
             raise PartError(f"bond model {self.species.model.name!r} gives an off-rate that is not a number")
-        tame = (leaving < _INSTANT) & (tensions < _STRONG)
+        tame = (leaving < _INSTANT) & (tensions < _STRONG) & (rates < _OVERFLOW).all(axis=0)
         return float(lengths[-1] if tame.all() else lengths[max(int(np.argmin(tame)) - 1, 1)])
+
+    def _lasting(self, rate: Function) -> tuple[float, float]:
+        """Give the lengths (µm) beyond which a rate has fallen to nothing, on either side; infinite where it never has.
+
+        The exponential of a catch bond falls through all numbers that a computer has; no table follows it there.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            longer = np.flatnonzero(np.abs(rate(self.species.rest_length * (1 + _STEPS))) >= NEVER)
+            shorter = np.flatnonzero(np.abs(rate(self.species.rest_length * np.maximum(1 - _STEPS, 0))) >= NEVER)
+        first, last = (int(found[-1]) + 1 if len(found) else 0 for found in (shorter, longer))
+        low = self.species.rest_length * (1 - _STEPS[first]) if first < len(_STEPS) else -np.inf
+        high = self.species.rest_length * (1 + _STEPS[last]) if last < len(_STEPS) else np.inf
+        return low, high
+
+    def _rates(self, state: int, exchange_columns: int) -> list[tuple[Function, float, float]]:
+        """Give each tabulated rate of an inner state, with the lengths between which it is more than nothing."""
+        rates = [lambda x: self.off_rate(x, state)]
+        rates += [lambda x, to=to: self.exchange(x)[state, to] for to in range(self.states())][:exchange_columns]
+        off, *exchange = [(rate, *self._lasting(rate)) for rate in rates]
+        return [off, (lambda x: self.on_rates(x)[state], *self.binding_lengths()), *exchange]
 
     def edges(self, state: int = 0) -> list[float]:
         """Give the ends and the breakpoints of the tables of an inner state."""
         rest = self.species.rest_length
         nearest, reach = self.binding_lengths()
-        steps = np.concatenate([[0.0], np.geomspace(1e-4, _FARTHEST, 2000)])
-        top = max(self._bounded(rest * (1 + steps), state), reach * (1 + 1e-9), rest * (1 + 1e-3))
+        top = max(self._bounded(rest * (1 + _STEPS), state), reach * (1 + 1e-9), rest * (1 + 1e-3))
         bottom = 0.0
         if self.species.compression == "linear":
-            bottom = self._bounded(np.maximum(rest * (1 - steps), 0.0), state)
-        inner = {rest, nearest, reach, *self.species.model.breakpoints()}
+            bottom = min(self._bounded(np.maximum(rest * (1 - _STEPS), 0.0), state), nearest * (1 - 1e-9))
+        inner = {rest, *self.species.model.breakpoints()}
+        inner |= {float(end) for _, *ends in self._rates(state, self.states()) for end in ends}
         return [bottom, *sorted(b for b in inner if bottom < b < top), top]
 
     def tables(self, exchange_columns: int = 0) -> list[Tables]:
@@ -206,19 +229,17 @@ class BondLaw:
             return [self._tabulated(state, columns) for state in range(self.states())]
 
     def _tabulated(self, state: int, exchange_columns: int) -> Tables:
-        nearest, reach = self.binding_lengths()
-
-        def on_rate(length: Array) -> Array:
-            within = (length >= nearest) & (length <= reach)
-            return np.where(within, self.on_rates(np.clip(length, nearest, reach))[state], 0.0)
-
-        rates = [lambda x: self.off_rate(x, state), on_rate]
-        rates += [lambda x, to=to: self.exchange(x)[state, to] for to in range(self.states())][:exchange_columns]
-        tables = tabulate([self.tension, *rates], self.edges(state), error=TABLE_ERROR, tangents=[0])
+        columns = [self.tension, *(_cut(*rate) for rate in self._rates(state, exchange_columns))]
+        tables = tabulate(columns, self.edges(state), error=TABLE_ERROR, tangents=[0])
         if (tables.coefficients[:, 1:, 0] < 0).any():
             raise PartError(f"{self._who()} has a negative rate")
-        lacking = 3 + exchange_columns - tables.coefficients.shape[1]
+        lacking = 3 + exchange_columns - len(columns)
         return tables._replace(coefficients=np.pad(tables.coefficients, ((0, 0), (0, lacking), (0, 0))))
+
+
+def _cut(rate: Function, low: float, high: float) -> Function:
+    """Make a rate nothing outside the lengths between which it is more."""
+    return lambda x: np.where((x >= low) & (x <= high), rate(np.clip(x, low, high)), 0.0)
 
 
 @frozen(kw_only=True, eq=False)

@@ -84,7 +84,7 @@ def _of_bond(species: BondSpecies, radius: float, stress: float, pull: float) ->
     tether = math.sqrt(radius / (2 * length)) * (force + torque / radius)
     lengths = np.array([length, length + tether / stiffness])
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        rates = np.asarray(species.model.off_rate(lengths), float)
+        rates = np.reshape(species.model.off_rate(lengths), (-1, 2))[0]  # of inner states, the first
         speeding = float(np.log(rates[1] / rates[0]))
     return [
         Group(
