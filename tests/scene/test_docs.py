@@ -15,7 +15,8 @@ SECTIONS = {
     "## Top level": spec.Scene, "## stop": spec.Stop, "## accuracy": spec.Accuracy, "## fluid": spec.Fluid,
     "## flow": spec.Flow, "## gravity": spec.Gravity, "## wall": spec.Wall, "## kinds": spec.Kind,
     "### sites of a kind": spec.CellSites, "## cells": spec.Cell, "### start": spec.Start, "## groups": spec.Group,
-    "## bonds": spec.Bond, "### on_rate": spec.OnRate, "## effects": spec.Effects, "## record": spec.Record,
+    "## bonds": spec.Bond, "### on_rate": spec.OnRate, "### encounter": spec.Encounter,
+    "## effects": spec.Effects, "## record": spec.Record,
     "### every": spec.Every, "### caught": spec.Caught, "## passage": spec.Passage,
 }  # fmt: skip
 

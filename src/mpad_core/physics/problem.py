@@ -7,7 +7,7 @@ from attrs import evolve, field, frozen
 from numpy.typing import NDArray
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.interfaces.bonds import BondModel
+from mpad_core.interfaces.bonds import BondModel, Encounter
 from mpad_core.interfaces.forces import GapForce
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.surface import Surface
@@ -24,18 +24,20 @@ Booleans = NDArray[np.bool_]
 
 @frozen(kw_only=True)
 class BondSpecies:
-    """One kind of bond between a kind of site on cells and the wall."""
+    """One kind of bond between a kind of site on cells and the wall, or a kind of site on other cells."""
 
     name: str
     site_kind: int  # index of the cells' site
     model: BondModel
-    surface: Surface  # density of the wall's sites
+    surface: Surface  # density of the wall's sites; none for bonds between cells
     rest_length: float  # µm
-    on_rate: float  # 1/s, of an unstressed bond
-    at_density: float  # 1/µm², the wall's site density that the on-rate is given for
+    on_rate: float  # 1/s, of an unstressed bond; between cells: of one pair of molecules
+    at_density: float  # 1/µm², the wall's site density that the on-rate is given for; between cells it means nothing
     reach: str  # overlap, pairs, boltzmann_gap
     compression: str  # slack, linear
     kT: float  # noqa: N815  # pN µm; the field's own symbol
+    encounter: Encounter | None = None  # a factor on the on-rate by the speed of slip
+    partner_kind: int = -1  # index of the site of other cells that it binds; -1: the wall's
 
 
 @frozen(kw_only=True)

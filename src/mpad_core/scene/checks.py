@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mpad_core.plugins import registry
 from mpad_core.plugins.registry import nearest
 from mpad_core.scene import conditions
 from mpad_core.scene.faults import Fault, Path, WrongError, listed, shown
@@ -83,6 +84,23 @@ def _body(path: Path, body: Tables, data: Tables) -> Iterator[Fault]:
         yield from _reaches((*path, "overlap"), body.get("kind"), data)
 
 
+def between_cells(data: Tables) -> dict[str, Tables]:
+    """Give the bonds whose second site is one of cells and not of the wall."""
+    carried, walls = _carried(data), _table(data, "wall", "sites")
+    found = {}
+    for name, bond in _tables(data, "bonds").items():
+        pair = bond.get("between")
+        second = pair[1] if isinstance(pair, list) and len(pair) == 2 else None
+        if isinstance(second, str) and second in carried and second not in walls:
+            found[name] = bond
+    return found
+
+
+def _carried(data: Tables) -> Tables:
+    """Give the sites that cells carry."""
+    return {site: None for kind in _tables(data, "kinds").values() for site in _table(kind, "sites")}
+
+
 def _reaches(path: Path, kind: Any, data: Tables) -> Iterator[Fault]:
     """Find an overlap that has no meaning, since no bond tells where its zero is."""
     if "wall" not in data:
@@ -91,22 +109,39 @@ def _reaches(path: Path, kind: Any, data: Tables) -> Iterator[Fault]:
     if not isinstance(kind, str) or kind not in _table(data, "kinds"):
         return
     sites = _table(data, "kinds", kind, "sites")
-    between = [bond.get("between") for bond in _tables(data, "bonds").values()]
+    inner = between_cells(data)
+    between = [bond.get("between") for name, bond in _tables(data, "bonds").items() if name not in inner]
     if not any(isinstance(pair, list) and pair and isinstance(pair[0], str) and pair[0] in sites for pair in between):
         yield Fault(path, f"needs a bond that cells of kind {kind!r} can form; give height instead")
 
 
 def _bonds(data: Tables) -> Iterator[Fault]:
-    if _table(data, "bonds") and "wall" not in data:
+    inner = between_cells(data)
+    if set(_table(data, "bonds")) - set(inner) and "wall" not in data:
         yield Fault(("bonds",), "bonds need a wall; add [wall] with its sites, or leave out the bonds")
         return
-    carried = {site: None for kind in _tables(data, "kinds").values() for site in _table(kind, "sites")}
+    carried, walls = _carried(data), _table(data, "wall", "sites")
     for name, bond in _tables(data, "bonds").items():
         pair = bond.get("between")
         if isinstance(pair, list) and len(pair) == 2:
             path = ("bonds", name, "between")
             yield from _known((*path, 0), pair[0], carried, "site of cells")
-            yield from _known((*path, 1), pair[1], _table(data, "wall", "sites"), "site of the wall")
+            yield from _known((*path, 1), pair[1], carried | walls, "site of the wall")
+            if isinstance(pair[1], str) and pair[1] in carried and pair[1] in walls:
+                yield Fault((*path, 1), f"{shown(pair[1])} is a site of the wall and one of cells; rename one of them")
+        yield from _of_pairs(("bonds", name), bond) if name in inner else _of_wall(("bonds", name), bond)
+
+
+def _of_pairs(path: Path, bond: Tables) -> Iterator[Fault]:
+    if bond.get("reach", "pairs") in ("overlap", "boltzmann_gap"):
+        yield Fault((*path, "reach"), 'between cells molecules bind one by one; write "pairs", or leave it out')
+
+
+def _of_wall(path: Path, bond: Tables) -> Iterator[Fault]:
+    on_rate = bond.get("on_rate")
+    if isinstance(on_rate, dict) and "at_density" not in on_rate:
+        what = "missing (the wall's site density that the on-rate holds for)"
+        yield Fault((*path, "on_rate", "at_density"), f'{what}; write at_density = "180 1/um^2"')
 
 
 def _flow(data: Tables) -> Iterator[Fault]:
@@ -190,3 +225,6 @@ def _models(scene: Scene) -> Iterator[Fault]:
             try_build(bond.model, rest_length=bond.length, stiffness=bond.stiffness, kT=energy)
         except WrongError as error:
             yield from (fault.under(("bonds", name, "model")) for fault in error.faults)
+        if bond.encounter is not None and hasattr(registry.load("bond", bond.model.name), "factor"):
+            what = f"bond model {bond.model.name!r} has an encounter of its own; leave this one out"
+            yield Fault(("bonds", name, "encounter"), what)

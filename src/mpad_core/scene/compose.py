@@ -2,21 +2,24 @@
 
 import zlib
 
+import attrs
 import numpy as np
 from attrs import evolve
 
 from mpad_core.arrays import Array, Indices
+from mpad_core.interfaces.bonds import BondModel, Encounter
 from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.surface import Surface
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.physics.asking import blamed
+from mpad_core.physics.bare import Bare
 from mpad_core.physics.layouts.layout import Layout
 from mpad_core.physics.layouts.uniform import Uniform
 from mpad_core.physics.problem import BondSpecies, CaughtWhen, Effect, Problem, Tolerances
 from mpad_core.physics.questions import check_needs
 from mpad_core.scene.effects import decide
 from mpad_core.scene.site_layouts import layout_of
-from mpad_core.scene.spec import Cell, Group, Part, Scene
+from mpad_core.scene.spec import Bond, Cell, Group, Scene
 from mpad_core.units import thermal_energy
 
 _TRIES = 1000  # for each cell placed at random
@@ -93,7 +96,9 @@ def _partners(scene: Scene, names: list[str]) -> Indices:
 
 def _site_names(scene: Scene) -> tuple[str, ...]:
     """Name the sites of cells that take part in bonds, each once."""
-    return tuple(dict.fromkeys(bond.between[0] for bond in scene.bonds.values()))
+    walls = scene.wall.sites if scene.wall else {}
+    named = [site for bond in scene.bonds.values() for site in bond.between]
+    return tuple(dict.fromkeys(site for site in named if site not in walls))
 
 
 def _site_densities(scene: Scene, cells: dict[str, Cell | Group]) -> Array:
@@ -113,30 +118,45 @@ def _layouts(scene: Scene, cells: dict[str, Cell | Group]) -> tuple[tuple[Layout
 
 
 def _species(scene: Scene) -> tuple[BondSpecies, ...]:
-    assert scene.wall is not None  # a scene with bonds and no wall has been refused
-    kT = thermal_energy(scene.fluid.temperature)
-    return tuple(
-        BondSpecies(
-            name=name,
-            site_kind=_site_names(scene).index(bond.between[0]),
-            model=bond.model.build(rest_length=bond.length, stiffness=bond.stiffness, kT=kT),
-            surface=_surface(scene.wall.sites[bond.between[1]]),
-            rest_length=bond.length,
-            on_rate=bond.on_rate.value,
-            at_density=bond.on_rate.at_density,
-            reach=bond.reach,
-            compression=bond.compression,
-            kT=kT,
+    kT, sites = thermal_energy(scene.fluid.temperature), _site_names(scene)
+    made = []
+    for name, bond in scene.bonds.items():
+        model = bond.model.build(rest_length=bond.length, stiffness=bond.stiffness, kT=kT)
+        made.append(
+            BondSpecies(
+                name=name,
+                site_kind=sites.index(bond.between[0]),
+                model=model,
+                surface=_surface(scene, bond),
+                rest_length=bond.length,
+                on_rate=bond.on_rate.value,
+                at_density=bond.on_rate.at_density or 1.0,  # without one, molecules are told apart
+                reach=bond.reach,
+                compression=bond.compression,
+                kT=kT,
+                encounter=_encounter(bond, model),
+                partner_kind=sites.index(bond.between[1]) if scene.between_cells(bond) else -1,
+            )
         )
-        for name, bond in scene.bonds.items()
-    )
+    return tuple(made)
 
 
-def _surface(part: Part) -> Surface:
-    """Make a surface; a file of its own may have changed since the scene was read."""
-    with blamed(f"surface {part.name!r}"):
-        made: Surface = part.instance
-    return made
+def _surface(scene: Scene, bond: Bond) -> Surface:
+    if scene.wall is None or scene.between_cells(bond):
+        return Bare()
+    part = scene.wall.sites[bond.between[1]]
+    with blamed(f"surface {part.name!r}"):  # a file of its own may have changed since the scene was read
+        surface: Surface = part.instance
+    return surface
+
+
+def _encounter(bond: Bond, model: BondModel) -> Encounter | None:
+    """Give the scene's encounter, or the model's own, if it has one; the scene has not both."""
+    if bond.encounter is None:
+        return model if isinstance(model, Encounter) else None
+    from mpad_core.physics.encounter import ChangHammer
+
+    return ChangHammer(**attrs.asdict(bond.encounter))
 
 
 def _weights(scene: Scene, gravity: Effect, cells: dict[str, Cell | Group]) -> Array:

@@ -61,7 +61,8 @@ def _bonds(scene: Scene, traits: SolverTraits) -> Call:
     binding = [name for name, cell in (scene.cells | scene.groups).items() if cell.binds]
     if not binding:
         return Call(False, "every cell is a probe that does not bind")
-    return Call(True, f"{', '.join(scene.bonds)}; {', '.join(binding)} can bind")
+    to = {name: " between cells" if scene.between_cells(bond) else "" for name, bond in scene.bonds.items()}
+    return Call(True, f"{', '.join(name + more for name, more in to.items())}; {', '.join(binding)} can bind")
 
 
 def _coupling(scene: Scene, traits: SolverTraits) -> Call:

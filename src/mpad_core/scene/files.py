@@ -87,6 +87,7 @@ def parse_scene(
     source = _Source(name, text, tuple(overriding.apply(data, overrides)))
     filled = _fill_densities(data)
     attach_files(data, folder)
+    _fill_reach(data)
     scene, found = _structured(data)
     found = [fault for fault in found if fault.path not in filled]
     found += islice(checks.references(data), MOST_FAULTS)
@@ -149,6 +150,12 @@ def _fill_densities(data: dict[str, Any]) -> set[Path]:
     for kind in silent.values():
         kind["density"] = density
     return {("kinds", name, "density") for name in silent}
+
+
+def _fill_reach(data: dict[str, Any]) -> None:
+    """Give bonds between cells the one reading of reach that they have."""
+    for bond in checks.between_cells(data).values():
+        bond.setdefault("reach", "pairs")
 
 
 def _silent(kind: Any) -> bool:

@@ -241,23 +241,38 @@ class Group:
 
 @frozen(kw_only=True)
 class OnRate:
-    """How fast bonds form, for one free site on a cell within reach of a wall of the given site density."""
+    """How fast bonds form, for one free site on a cell within reach of a wall of the given site density.
+
+    Between cells, for one pair of molecules within reach.
+    """
 
     value: float = _measure("1/s", _RATE, doc="on-rate")
-    at_density: float = _measure("1/um^2", Within(0, 1e6, above=True), doc="the wall's site density that it holds for")
+    at_density: float | None = _measure(
+        "1/um^2", Within(0, 1e6, above=True), default=None, doc="the wall's site density that it holds for"
+    )
+
+
+@frozen(kw_only=True)
+class Encounter:
+    """Encounter of molecules on surfaces that slip past each other, after Chang & Hammer (1999)."""
+
+    radius: float = _measure("um", Within(0, 10, above=True), doc="radius of the disc in which molecules react")
+    diffusivity: float = _measure("um^2/s", Within(0, 1e9, above=True), doc="of one molecule relative to the other")
+    reaction_rate: float = _measure("1/s", Within(0, 1e15), doc="rate at which molecules in the disc react")
 
 
 @frozen(kw_only=True)
 class Bond:
-    """One species of bond between a site of cells and a site of the wall."""
+    """One species of bond between a site of cells and a site of the wall or of other cells."""
 
-    between: tuple[str, str] = _says("a site of cells and a site of the wall")
+    between: tuple[str, str] = _says("a site of cells, and a site of the wall or of other cells")
     model: Annotated[Part, Slot("bond")] = _says("the bond model: how fast a bond breaks, how hard it pulls")
     on_rate: OnRate = _says("how fast bonds form")
     length: float = _measure("um", Within(0, 10, above=True), doc="length of the unstressed bond")
     stiffness: float = _measure("pN/um", Within(0, 1e9, above=True), doc="spring constant of the bond")
     reach: Literal["overlap", "pairs", "boltzmann_gap"] = _says("which sites can bind", default="overlap")
     compression: Literal["slack", "linear"] = _says("whether a bond shorter than its length pushes", default="slack")
+    encounter: Encounter | None = _says("how the on-rate grows with slip; left out: not at all", default=None)
 
 
 @frozen(kw_only=True)
@@ -342,9 +357,14 @@ class Scene:
     record: Record = _says("what is kept of the run", factory=Record)
     passage: Passage | None = _says("a study of one cell passing others", default=None)
 
+    def between_cells(self, bond: Bond) -> bool:
+        """Tell whether a bond's second site is one of cells, not one of the wall."""
+        return self.wall is None or bond.between[1] not in self.wall.sites
+
     def bonds_of(self, kind: str) -> dict[str, Bond]:
-        """Give the species of bonds that cells of a kind can form."""
-        return {name: bond for name, bond in self.bonds.items() if bond.between[0] in self.kinds[kind].sites}
+        """Give the species of bonds that cells of a kind can form with the wall."""
+        able = {name: bond for name, bond in self.bonds.items() if bond.between[0] in self.kinds[kind].sites}
+        return {name: bond for name, bond in able.items() if not self.between_cells(bond)}
 
     def zero_overlap_height(self, kind: str) -> float:
         """Give the height (µm) of overlap zero, where the longest unstressed bond just reaches; NaN where none can."""
