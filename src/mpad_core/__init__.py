@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from mpad_core.interfaces.forces import GapForce
     from mpad_core.interfaces.mobility import Fluctuating, FluidVelocity, MobilitySolver
     from mpad_core.interfaces.observer import FieldDeclaration, Frame, Observer
+    from mpad_core.interfaces.presets import Preset
     from mpad_core.interfaces.surface import Resolving, Surface
     from mpad_core.interfaces.values import AccuracyLevel, Configuration, Motion, Report, Setting, SolverTraits
     from mpad_core.physics.questions import mobility_matrix, solver, velocities
@@ -39,6 +40,7 @@ _HOMES = {
     ),
     "mpad_core.interfaces.mobility": ("MobilitySolver", "Fluctuating", "FluidVelocity"),
     "mpad_core.interfaces.bonds": ("BondModel", "Interconverting", "Encounter"),
+    "mpad_core.interfaces.presets": ("Preset",),
     "mpad_core.interfaces.surface": ("Surface", "Resolving"),
     "mpad_core.interfaces.forces": ("GapForce",),
     "mpad_core.interfaces.observer": ("Observer", "Frame", "FieldDeclaration"),
@@ -64,6 +66,7 @@ __all__ = [
     "MpadError",
     "Observer",
     "PartError",
+    "Preset",
     "RefusedError",
     "Report",
     "Resolving",

@@ -35,6 +35,8 @@ def _described(part: InstalledPart) -> Iterator[str]:
     abilities = [text for member, text in _ABILITIES.get(part.kind, {}).items() if hasattr(loaded, member)]
     if abilities:
         yield f"      can also: {', '.join(abilities)}"
+    for name, preset in getattr(loaded, "presets", {}).items():
+        yield f"      preset {name}  {preset.provenance}: {preset.source}"
     if attrs.has(loaded):
         yield from (_parameter(field, KINDS[part.kind].filled) for field in attrs.fields(loaded) if field.init)
 

@@ -11,10 +11,10 @@ from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any, Final
 
-from attrs import frozen
+from attrs import evolve, frozen
 
 from mpad_core.interfaces.errors import InputError
-from mpad_core.scene import checks, overriding
+from mpad_core.scene import checks, overriding, provenance
 from mpad_core.scene.attached import attach_files
 from mpad_core.scene.faults import MOST_FAULTS, Fault, Path, dotted, one_line
 from mpad_core.scene.lines import LARGEST_TEXT, key_lines, refusal
@@ -85,17 +85,21 @@ def parse_scene(
     """
     data = _parsed(text, name)
     source = _Source(name, text, tuple(overriding.apply(data, overrides)))
+    said, wrong = provenance.take(data)
+    said = provenance.kept(said, source.overridden)
+    written = provenance.given(data)
     filled = _fill_densities(data)
     attach_files(data, folder)
     _fill_reach(data)
     scene, found = _structured(data)
-    found = [fault for fault in found if fault.path not in filled]
+    found = [fault for fault in found if fault.path not in filled] + wrong
     found += islice(checks.references(data), MOST_FAULTS)
     if scene is not None and not found:
         found += islice(checks.values(scene), MOST_FAULTS)
+        found += provenance.unknown(said, provenance.keys(scene))
     if scene is None or found:
         raise InputError(*source.lines(found))
-    return scene
+    return evolve(scene, provenance=provenance.complete(scene, said, written))
 
 
 def _read(path: str | PathLike[str]) -> str:

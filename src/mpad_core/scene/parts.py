@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import attrs
+from attrs import frozen
 
 from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.plugins import registry
@@ -28,8 +29,9 @@ def read_part(value: Any, slot: Slot, read: ReadValue) -> Part:
     """
     name, given = _named(value, slot)
     fields = _fields(slot.kind, name)
+    preset = _preset(slot.kind, name, given, fields)
     optional = registry.KINDS[slot.kind].filled
-    found, wrongs = {}, _unknown(given, fields, name) + _lacking(given, fields, optional, name)
+    found, wrongs = {}, _unknown(given, fields, name) + _lacking(preset.parameters | given, fields, optional, name)
     for key in (key for key in given if key in fields):
         try:
             found[key] = read(given[key], fields[key].type, fields[key].metadata.get("unit"))
@@ -40,7 +42,10 @@ def read_part(value: Any, slot: Slot, read: ReadValue) -> Part:
     defaults = {key: plain(field) for key, field in fields.items() if key not in optional}
     defaults = {key: default for key, default in defaults.items() if default is not None}
     written = {key: text for key, text in given.items() if isinstance(text, str) and isinstance(found[key], float)}
-    part = Part(kind=slot.kind, name=name, parameters=defaults | found, written=_only_dimension(written, fields))
+    part = Part(
+        kind=slot.kind, name=name, parameters=defaults | preset.parameters | found,
+        written=_only_dimension(written, fields), origins=dict.fromkeys(preset.parameters, preset.text),
+    )  # fmt: skip
     if not optional:
         try_build(part)
     return part
@@ -59,6 +64,30 @@ def _named(value: Any, slot: Slot) -> tuple[str, dict[str, Any]]:
         what = "missing" if name is None else f"must be text in quotes, not {shown(name)}"
         raise WrongError(Fault((key,), f"{what}; name a {slot.kind} (installed: {known})"))
     return _installed(slot.kind, name, (key,)), {name: given for name, given in value.items() if name != key}
+
+
+@frozen
+class _Chosen:
+    """What a preset gives, and how its provenance reads."""
+
+    parameters: dict[str, Any] = attrs.field(factory=dict)
+    text: str = ""
+
+
+def _preset(kind: str, name: str, given: dict[str, Any], fields: Fields) -> _Chosen:
+    """Take the key ``preset`` out of what is given, and look it up; a part may have a parameter called so itself."""
+    if "preset" not in given or "preset" in fields:
+        return _Chosen()
+    known = getattr(registry.load(kind, name), "presets", {})
+    chosen = given.pop("preset")
+    if not isinstance(chosen, str) or chosen not in known:
+        hint = registry.nearest(chosen[:100], known) if isinstance(chosen, str) else ""
+        raise WrongError(Fault(("preset",), f"{name!r} has no preset {shown(chosen)}{hint} (it has: {listed(known)})"))
+    preset = known[chosen]
+    strange = sorted(set(preset.parameters) - set(fields))
+    if strange:
+        raise PartError(f"{kind} {name!r}: its preset {chosen!r} sets {', '.join(strange)}, which it does not have")
+    return _Chosen(dict(preset.parameters), f"{preset.provenance}: preset {chosen}, {preset.source}")
 
 
 def _installed(kind: str, name: str, path: tuple[str, ...]) -> str:

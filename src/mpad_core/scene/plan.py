@@ -6,6 +6,7 @@ from mpad_core.physics.asking import blamed
 from mpad_core.plugins.registry import find
 from mpad_core.scene.compose import compose
 from mpad_core.scene.groups import dimensionless_groups
+from mpad_core.scene.provenance import lines
 from mpad_core.scene.spec import Part, Scene
 from mpad_core.units import thermal_energy
 
@@ -32,6 +33,8 @@ def plan_lines(scene: Scene) -> Iterator[str]:
     yield "effects:"
     for effect in problem.effects:
         yield f"  {effect.name:<12} {'on ' if effect.on else 'off'}  {effect.why}"
+    yield "provenance:"
+    yield from lines(scene)
     yield "groups:"
     kT = thermal_energy(scene.fluid.temperature)
     with blamed(f"a bond model ({', '.join(s.model.name for s in problem.species)})"):

@@ -86,13 +86,15 @@ class Part:
     """A part as the scene names it.
 
     ``parameters`` are complete (defaults included) and in inner units, but for those that the core fills.
-    ``written`` keeps the text of parameters whose dimension only the text tells.
+    ``written`` keeps the text of parameters whose dimension only the text tells, ``origins`` where those of a preset
+    come from.
     """
 
     kind: str
     name: str
     parameters: dict[str, Any] = attrs.field(factory=dict)
     written: dict[str, str] = attrs.field(factory=dict, eq=False, repr=False)
+    origins: dict[str, str] = attrs.field(factory=dict, eq=False, repr=False)
 
     def build(self, **filled: Any) -> Any:
         """Make the part; what the core fills goes where the part has such a field and the scene is silent."""
@@ -356,6 +358,7 @@ class Scene:
     effects: Effects = _says("what is taken into account", factory=Effects)
     record: Record = _says("what is kept of the run", factory=Record)
     passage: Passage | None = _says("a study of one cell passing others", default=None)
+    provenance: dict[str, str] = _says("where values come from, by their dotted keys", factory=dict)
 
     def between_cells(self, bond: Bond) -> bool:
         """Tell whether a bond's second site is one of cells, not one of the wall."""

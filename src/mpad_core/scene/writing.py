@@ -15,10 +15,11 @@ def resolved_toml(scene: Scene) -> str:
 
     Files are named as in a run directory, which has copies of them: see `mpad_core.scene.attached`.
     """
-    return tomli_w.dumps(_table(scene))
+    return tomli_w.dumps(table(scene))
 
 
-def _table(value: Any) -> dict[str, Any]:
+def table(value: Any) -> dict[str, Any]:
+    """Turn a value of the scene into a table that TOML can hold."""
     fields = attrs.fields(type(value))
     found = {field.name: _plain(getattr(value, field.name), field.metadata.get("unit")) for field in fields}
     return {key: item for key, item in found.items() if item is not None and item != {}}
@@ -35,7 +36,7 @@ def _plain(value: Any, unit: str | None) -> Any:
     if isinstance(value, tuple):
         return [_plain(item, unit) for item in value]
     if attrs.has(type(value)):
-        return _table(value)
+        return table(value)
     return f"{value!r} {unit}" if unit and isinstance(value, float) else value
 
 

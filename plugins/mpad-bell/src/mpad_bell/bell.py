@@ -1,11 +1,13 @@
 """Bell's bond: a linear spring whose off-rate grows exponentially with its tension (Bell, Science 200:618, 1978)."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 from attrs import field, frozen
 
-from mpad_core import Array, BondModel, hookimpl, quantity
+from mpad_bell.presets import PRESETS
+from mpad_core import Array, BondModel, Preset, hookimpl, quantity
 
 
 @frozen(kw_only=True)
@@ -23,6 +25,7 @@ class Bell:
     """
 
     name: ClassVar[str] = "bell"
+    presets: ClassVar[Mapping[str, Preset]] = PRESETS
     unstressed_off_rate: float = quantity("1/s", alias="off_rate", doc="off-rate of the unstressed bond")
     reactive_compliance: float = quantity("um", default=0.0, doc="how strongly force speeds breaking")
     stiffness: float = quantity("pN/um", doc="spring constant")

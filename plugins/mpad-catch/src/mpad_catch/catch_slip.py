@@ -1,11 +1,22 @@
 """The catch-slip bond: a pathway that force closes, one that it opens (Pereverzev et al., Biophys J 89:1446, 2005)."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 from attrs import field, frozen
 
-from mpad_core import Array, BondModel, hookimpl, quantity
+from mpad_core import Array, BondModel, Preset, hookimpl, quantity
+
+_PRESETS = {
+    "p-selectin": Preset(
+        parameters={
+            "catch_rate": 120.0, "catch_compliance": 2.17e-3, "slip_rate": 0.25, "slip_compliance": 0.51e-3,
+        },
+        source="Pereverzev et al., Biophys J 89:1446, 2005: P-selectin and soluble PSGL-1",
+        provenance="recalled",
+    ),
+}  # fmt: skip
 
 
 @frozen(kw_only=True)
@@ -26,6 +37,7 @@ class CatchSlip:
     """
 
     name: ClassVar[str] = "catch-slip"
+    presets: ClassVar[Mapping[str, Preset]] = _PRESETS
     catch_rate: float = quantity("1/s", doc="off-rate of the unstressed bond along the pathway that force closes")
     catch_compliance: float = quantity("um", doc="how strongly force closes it")
     slip_rate: float = quantity("1/s", doc="off-rate of the unstressed bond along the pathway that force opens")
