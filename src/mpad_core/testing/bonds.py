@@ -10,11 +10,12 @@ from scipy.integrate import quad
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.bonds import BondModel, Interconverting
+from mpad_core.interfaces.presets import Preset
 from mpad_core.numerics.tables import Tables, value
 from mpad_core.physics.problem import BondSpecies
 from mpad_core.physics.reactions import NEVER, TABLE_ERROR, BondLaw
 from mpad_core.testing.claims import check
-from mpad_core.testing.samples import REST_LENGTH, THERMAL_ENERGY, Everywhere
+from mpad_core.testing.samples import REST_LENGTH, THERMAL_ENERGY, Everywhere, typical
 from mpad_core.testing.strategies import numbers, tried
 
 _SHARES = st.lists(numbers(0.0, 1.0), min_size=1, max_size=20).map(np.array)
@@ -189,6 +190,13 @@ class BondModelContract:
         assert rates.shape == np.asarray(self.model.off_rate(lengths)).shape
         assert np.isfinite(rates).all()
         assert (rates >= 0).all()
+
+    def test_presets_fit(self) -> None:
+        """What the model offers by name are its own parameters, and a model can be made of them."""
+        for name, preset in getattr(self.model, "presets", {}).items():
+            assert isinstance(preset, Preset), name
+            assert preset.source, name
+            assert isinstance(typical(type(self.model), **preset.parameters), BondModel), name
 
     def test_pure(self) -> None:
         """Asked again it says the same, and it leaves its input alone."""
