@@ -11,7 +11,8 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.bonds import Encounter
 from mpad_core.interfaces.errors import PartError
 from mpad_core.numerics.tables import value
-from mpad_core.physics.encounter import ENCOUNTER_ERROR, FASTEST, SLOWEST, ChangHammer, encounter_table, nusselt
+from mpad_core.physics.encounter import ChangHammer, nusselt
+from mpad_core.physics.reactions import ENCOUNTER_ERROR, FASTEST, SLOWEST, encounter_table
 
 # worked out by other means, from the same boundary-value problem
 KNOWN = [(0.001, 0.25917), (0.01, 0.36935), (0.1, 0.63759), (1, 1.69484), (3, 3.39442), (10, 8.55474)]

@@ -1,5 +1,7 @@
 """Bonds in a scene: between cells, and with an encounter under slip."""
 
+import subprocess
+import sys
 from typing import Any, ClassVar
 
 import numpy as np
@@ -147,3 +149,13 @@ def test_a_models_own_encounter_is_used_and_not_doubled(monkeypatch: Any) -> Non
     assert refused(text + SLIP) == (
         "bonds.doublet.encounter: bond model 'bell' has an encounter of its own; leave this one out",
     )
+
+
+def test_checking_an_encounter_compiles_nothing() -> None:
+    code = (
+        "import sys\nfrom mpad_core.scene.compose import compose\nfrom mpad_core.scene.files import parse_scene\n"
+        "assert compose(parse_scene(sys.argv[1])).species[0].encounter is not None\nassert 'numba' not in sys.modules"
+    )
+    text = CELLS + DOUBLET + SLIP
+    done = subprocess.run([sys.executable, "-c", code, text], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,17 +1,14 @@
-"""Encounter of molecules on surfaces that slip past each other, after Chang & Hammer (Biophys J 76:1280, 1999)."""
+"""Encounter of molecules on surfaces that slip past each other, after Chang & Hammer (Biophys J 76:1280, 1999).
+
+Its table for compiled code is made in `mpad_core.physics.reactions`, so that checking a scene compiles nothing.
+"""
 
 import numpy as np
 from attrs import frozen
 from scipy.special import ive, kve
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.bonds import Encounter
-from mpad_core.interfaces.errors import PartError
-from mpad_core.numerics.tables import Tables, tabulate
-from mpad_core.physics.asking import blamed
 
-ENCOUNTER_ERROR = 1e-5  # relative, of the table
-SLOWEST, FASTEST = 1e-6, 1e5  # µm/s: a nanometre in a quarter of an hour; a hundred times a fast cell
 _FAR = 16.0  # Péclet number: here terms of the series are 1e6 times their sum, and the asymptote is good to 1e-7
 _SHADOW = (1.0, 0.99619318, 0.02235312, 0.01458652, -0.0097789, 0.0035869)  # M_m; they fit the series at 16 < Pe < 40
 _TERMS = 60  # for a Péclet number of 16, the last one is 1e-40 of the first
@@ -83,23 +80,3 @@ class ChangHammer:
         damkoehler = self.radius**2 * self.reaction_rate / self.diffusivity
         factor: Array = caught / (caught + damkoehler) if damkoehler > 0 else np.ones_like(caught)
         return factor
-
-
-def encounter_table(encounter: Encounter) -> Tables:
-    """Tabulate the factor on the on-rate over the slip speed (µm/s): one column, good to `ENCOUNTER_ERROR`.
-
-    Pieces are decades of speed. Outside `SLOWEST` and `FASTEST` the factor is that at these speeds, also at rest, where
-    a law such as `ChangHammer` has none: no cell is held so still that the difference shows.
-
-    Raises
-    ------
-    PartError
-        If the factor is negative, not finite, not elementwise, or has kinks that no table follows.
-    """
-    decades = round(np.log10(FASTEST / SLOWEST))
-    edges = np.geomspace(SLOWEST, FASTEST, decades + 1)
-    with blamed("the encounter of a bond"):
-        tables = tabulate([encounter.factor], [float(edge) for edge in edges], error=ENCOUNTER_ERROR, tangents=[])
-    if (tables.coefficients[..., 0] < 0).any():
-        raise PartError("the encounter of a bond has a negative factor on the on-rate")
-    return tables

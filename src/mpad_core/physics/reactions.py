@@ -24,7 +24,7 @@ from attrs import evolve, frozen
 from numpy.polynomial.legendre import leggauss
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.bonds import Interconverting
+from mpad_core.interfaces.bonds import Encounter, Interconverting
 from mpad_core.interfaces.errors import PartError
 from mpad_core.numerics.tables import Function, Tables, tabulate
 from mpad_core.physics import inner_states
@@ -32,6 +32,8 @@ from mpad_core.physics.asking import blamed
 from mpad_core.physics.problem import BondSpecies
 
 TABLE_ERROR = 1e-6
+ENCOUNTER_ERROR = 1e-5  # relative, of the table of an encounter
+SLOWEST, FASTEST = 1e-6, 1e5  # µm/s: a nanometre in a quarter of an hour; a hundred times a fast cell
 NEVER = 1e-12  # 1/s, once in 30 000 years: rates that have fallen below are tabulated as none
 _NEGLIGIBLE = 1e-9  # of the unstressed on-rate: beyond, no bond forms
 _FALLEN = 1e-3  # of its largest value: an on-rate that has fallen so far at ten rest lengths has a reach of its own
@@ -290,3 +292,23 @@ def hazard_table(law: BondLaw, k_on: float | None = None) -> HazardTable:
 
 def _mean(values: Array) -> Array:
     return 0.5 * (values[1:] + values[:-1])
+
+
+def encounter_table(encounter: Encounter) -> Tables:
+    """Tabulate the factor on the on-rate over the slip speed (µm/s): one column, good to `ENCOUNTER_ERROR`.
+
+    Pieces are decades of speed. Outside `SLOWEST` and `FASTEST` the factor is that at these speeds, also at rest, where
+    that of `mpad_core.physics.encounter.ChangHammer` is zero, which no surface is still for long enough to come near.
+
+    Raises
+    ------
+    PartError
+        If the factor is negative, not finite, not elementwise, or has kinks that no table follows.
+    """
+    decades = round(np.log10(FASTEST / SLOWEST))
+    edges = np.geomspace(SLOWEST, FASTEST, decades + 1)
+    with blamed("the encounter of a bond"):
+        tables = tabulate([encounter.factor], [float(edge) for edge in edges], error=ENCOUNTER_ERROR, tangents=[])
+    if (tables.coefficients[..., 0] < 0).any():
+        raise PartError("the encounter of a bond has a negative factor on the on-rate")
+    return tables
