@@ -4,7 +4,6 @@ from typing import ClassVar
 
 import numpy as np
 from attrs import field, frozen
-from scipy.special import expit
 
 from mpad_core import Array, BondModel, hookimpl, quantity
 
@@ -81,8 +80,8 @@ class TwoState:
         """Give X₀₁ = ν r / (1 + r) and X₁₀ = ν / (1 + r) off a diagonal of zeros, (2, 2, ...)."""
         log_ratio = np.abs(self.tension(length)) / self.exchange_force - self.energy_difference / self.kT
         rates = np.zeros((2, 2, *np.shape(length)))
-        rates[0, 1] = self.exchange_rate * expit(log_ratio)
-        rates[1, 0] = self.exchange_rate * expit(-log_ratio)
+        rates[0, 1] = self.exchange_rate * np.exp(-np.logaddexp(0.0, -log_ratio))
+        rates[1, 0] = self.exchange_rate * np.exp(-np.logaddexp(0.0, log_ratio))
         return rates
 
     def breakpoints(self) -> tuple[float, ...]:
