@@ -30,7 +30,7 @@ BOND_EVENT = np.dtype(
         ("receptor", "i8"),  # index of the molecule on its cell
         ("partner", "i4"),  # the other cell of a bond between cells; -1 for the wall
         ("ligand", "i8"),  # index of the partner's molecule, or identity of the wall's; -1: not told apart
-        ("anchor_x", "f8"),  # µm, where the bond holds the wall, or the partner at that time
+        ("anchor_x", "f8"),  # µm, where the bond holds the wall; of one between cells: the partner's end at its birth
         ("anchor_y", "f8"),
         ("length", "f8"),  # µm
         ("force", "f8"),  # pN

@@ -105,21 +105,22 @@ def compiled_sums(function: Callable[P, R]) -> Callable[P, R]:
     return kernel
 
 
+_LEAN: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True, "_nrt": False}
+
+
 def compiled_lean(function: Callable[P, R]) -> Callable[P, R]:
     """Compile as `compiled` does, without reference counts: for functions that make no array and keep none.
 
     To take an array out of a named tuple otherwise costs two atomic sums for each array of that tuple, which in small
     functions is most of the time.
     """
-    lean = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False)
-    kernel: Callable[P, R] = _forgiving(lean(function))
+    kernel: Callable[P, R] = _forgiving(numba.njit(**_LEAN)(function))
     return kernel
 
 
 def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
     """Compile as `compiled_lean` does, and put the code wherever it is called: for what inner loops call."""
-    inlined = numba.njit(cache=True, error_model="numpy", nogil=True, _nrt=False, forceinline=True)
-    kernel: Callable[P, R] = _forgiving(inlined(function))
+    kernel: Callable[P, R] = _forgiving(numba.njit(**_LEAN, forceinline=True)(function))
     return kernel
 
 

@@ -1,5 +1,6 @@
 """A wall without sites: what bonds between cells have for a surface."""
 
+import math
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +18,10 @@ class Bare:
     def density(self, x: Array, y: Array) -> Array:
         """Give the density (1/µm²): zero."""
         return np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
+
+    def resolution(self) -> float:
+        """Give infinity: it is the same everywhere."""
+        return math.inf
 
     def densest(self) -> float:
         """Give zero."""

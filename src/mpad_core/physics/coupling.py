@@ -24,6 +24,7 @@ from mpad_core.physics.questions import constrained_motion, unit_load
 
 NOT_FELT = 1e12  # radii: the wall functions are those of an unbounded fluid to the last bit at this gap
 _ROOM_TO_MOVE = 1.25  # of the reach of contact
+_BOND_REACH = 30.0  # unstressed lengths: as far as tables of bonds go at most
 _ASYMMETRY = 0.1  # of sqrt(M_ii M_jj): coarse boundary elements reach 0.03 (near contact), and are symmetrised
 _REACHES = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group
 
@@ -226,8 +227,11 @@ def drift_of(problem: Problem, coupling: Coupler) -> Drift:
 
 
 def contact_reach(problem: Problem) -> float:
-    """Give the smooth gap (µm) below which two cells may repel each other."""
-    return 0.0 if problem.contact is None else 2 * float(problem.roughness.max()) + problem.contact.gaps()[1]
+    """Give the smooth gap (µm) below which two cells may repel each other, or bind to each other."""
+    bumps = 2 * float(problem.roughness.max())
+    repelling = 0.0 if problem.contact is None else bumps + problem.contact.gaps()[1]
+    binding = [bumps + _BOND_REACH * s.rest_length for s in problem.species if s.partner_kind >= 0]
+    return max([repelling, *binding])
 
 
 def contact_range(problem: Problem) -> float:

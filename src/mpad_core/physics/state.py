@@ -98,8 +98,10 @@ class State:
     way: Way | None = None  # of the last outer step; neither is this
 
     def bond_counts(self) -> Indices:
-        """Give each cell's number of living bonds."""
-        return np.bincount(self.bonds.cell, minlength=len(self.wall_gaps))
+        """Give each cell's number of living bonds, those to other cells included."""
+        cells, partner = len(self.wall_gaps), self.bonds.partner
+        kept = np.bincount(self.bonds.cell, minlength=cells)
+        return kept + np.bincount(partner[partner >= 0], minlength=cells)
 
 
 def to_arrays(state: State) -> dict[str, Any]:

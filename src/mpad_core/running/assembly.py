@@ -25,6 +25,7 @@ from mpad_core.running.layout import (
     Groups,
     Molecules,
     Motion,
+    Neighbours,
     Progress,
     Species,
     System,
@@ -61,13 +62,14 @@ def _species(problem: Problem) -> Species:
             no_tables(3), np.zeros(1, np.int64), none, none, empty, empty, empty, np.zeros(0, np.uint8), empty,
             no_tables(1), none,
         )  # fmt: skip
-    from mpad_core.physics.reactions import BondLaw
+    from mpad_core.physics.reactions import BondLaw, encounter_table
 
     for species in problem.species:
         _check_crowding(species)
     laws = [BondLaw(species=species) for species in problem.species]
     # in the reading "overlap" a bond that would push if it stood upright is born unstressed, hence tilted
     tilted = [s.reach == "overlap" and s.compression == "linear" for s in problem.species]
+    order = [k for k, s in enumerate(problem.species) if s.encounter is not None]
     most = max(law.states() for law in laws)
     exchanges = most if most > 1 else 0
     tables = [law.tables(exchanges) for law in laws]
@@ -75,14 +77,14 @@ def _species(problem: Problem) -> Species:
         tables=together([table for own in tables for table in own], 3 + exchanges),
         first=np.cumsum([0, *(len(own) for own in tables)]),
         site_kind=np.array([s.site_kind for s in problem.species], np.int64),
-        partner_kind=np.full(len(laws), -1, np.int64),
+        partner_kind=np.array([s.partner_kind for s in problem.species], np.int64),
         reach=np.array([law.reach() for law in laws]),
         slack_below=np.array([s.rest_length if s.compression == "slack" else -1.0 for s in problem.species]),
         least_length=np.array([s.rest_length * tilt for s, tilt in zip(problem.species, tilted, strict=True)]),
-        pairwise=np.array([s.reach == "pairs" for s in problem.species], np.uint8),
+        pairwise=np.array([s.reach == "pairs" or s.partner_kind >= 0 for s in problem.species], np.uint8),
         ligand_density=np.array([s.surface.densest() for s in problem.species]),
-        encounters=no_tables(1),
-        encounter=np.full(len(laws), -1, np.int64),
+        encounters=together([encounter_table(s.encounter) for s in problem.species if s.encounter is not None], 1),
+        encounter=np.array([-1 if s.encounter is None else order.index(k) for k, s in enumerate(problem.species)]),
     )
 
 
@@ -177,7 +179,20 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
     )
     first = np.searchsorted(np.sort(owner), np.arange(len(sizes) + 1))
     contacts = Contacts(fixed.contact_law, fixed.contact_reach, np.ascontiguousarray(pairs), first)
-    return System(fixed.bodies, fixed.molecules, fixed.species, contacts, groups, fixed.thermal, around)
+    bridging = (fixed.species.partner_kind >= 0).any()
+    neighbours = neighbours_of(problem, pairs if bridging else np.zeros((0, 2), np.int64))
+    return System(
+        fixed.bodies, fixed.molecules, fixed.species, contacts, neighbours, groups, fixed.thermal, around
+    )  # fmt: skip
+
+
+def neighbours_of(problem: Problem, pairs: Indices) -> Neighbours:
+    """Sort pairs of cells by their keepers: the first of two, or the one that is not held."""
+    keeper = np.where(problem.held[pairs[:, 0]], pairs[:, 1], pairs[:, 0])
+    order = np.argsort(keeper, kind="stable")
+    partner = pairs.sum(axis=1) - keeper
+    first = np.searchsorted(keeper[order], np.arange(len(problem.radii) + 1))
+    return Neighbours(first, np.ascontiguousarray(partner[order]))
 
 
 _BOND_FIELDS = ("site", "species", "state", "partner", "ligand", "anchor")
@@ -193,7 +208,7 @@ class Room(NamedTuple):
     events: Any
 
 
-def room_for(fixed: Fixed, bonds: BondList, cells: int, times: int = 1) -> Room:
+def room_for(fixed: Fixed, bonds: BondList, cells: int, neighbours: Neighbours | None = None, times: int = 1) -> Room:
     """Lay the living bonds out, with room for more; `times` is by how much there is more of it than at first."""
     counts = np.bincount(bonds.cell, minlength=cells)
     first = np.concatenate([[0], np.cumsum(2 * counts + 64 * times)])
@@ -202,12 +217,12 @@ def room_for(fixed: Fixed, bonds: BondList, cells: int, times: int = 1) -> Room:
     for name in _BOND_FIELDS:
         getattr(laid, name)[places] = getattr(bonds, name)
     for cell in np.flatnonzero(np.bincount(bonds.cell[bonds.partner >= 0], minlength=cells)):
-        list_bridges(cell, laid)
+        list_bridges(int(cell), laid)
     bound = np.zeros(len(fixed.molecules.kind), np.uint8)
     bound[bonds.site] = 1
     bound[bonds.ligand[bonds.partner >= 0]] = 1
     events: Any = np.zeros(256 * times, BOND_EVENT)
-    return Room(laid, bound, _candidates(fixed, times), events)
+    return Room(laid, bound, _candidates(fixed, neighbours, times), events)
 
 
 def _no_bonds(first: Indices, counts: Indices) -> Bonds:
@@ -217,23 +232,31 @@ def _no_bonds(first: Indices, counts: Indices) -> Bonds:
     return Bonds(first, counts, site, species, state, partner, ligand, anchor, np.zeros_like(counts), bridge)
 
 
-def _candidates(fixed: Fixed, times: int) -> Candidates:
+def _candidates(fixed: Fixed, neighbours: Neighbours | None, times: int) -> Candidates:
     sites = np.diff(fixed.molecules.first)
+    partner = np.zeros(0, np.int64) if neighbours is None else neighbours.partner
+    keeper = (
+        np.zeros(0, np.int64) if neighbours is None else np.repeat(np.arange(len(sites)), np.diff(neighbours.first))
+    )
+    facing = np.concatenate([[0], np.cumsum(sites[np.stack([keeper, partner], axis=1).ravel()])])
+    pairs = len(partner)
     several = 8 if fixed.species.pairwise.any() else 1
     first = np.concatenate([[0], np.cumsum(several * times * np.minimum(sites, _FEW))])
     cells, room = len(sites), int(first[-1])
-    site, species, ligand, partner = (np.empty(room, np.int64) for _ in range(4))
+    site, species, ligand, other = (np.empty(room, np.int64) for _ in range(4))
     return Candidates(
-        first, np.zeros(cells, np.int64), site, species, ligand, partner, np.empty(room), np.empty(room),
-        fixed.molecules.first, np.zeros(cells, np.int64), np.empty(int(sites.sum()), np.int64), np.zeros((cells, 2)),
-        np.zeros((cells, 2)), np.zeros((cells, 2, 3)), np.zeros((cells, 2, 3)),
+        first, np.zeros(cells, np.int64), site, species, ligand, other, np.zeros(room), np.zeros(room),
+        fixed.molecules.first,
+        np.zeros(cells, np.int64), np.empty(int(sites.sum()), np.int64), np.zeros((cells, 2)), np.zeros((cells, 2)),
+        np.zeros((cells, 2, 3)), np.zeros((cells, 2, 3)), facing, np.zeros(2 * pairs, np.int64),
+        np.empty(int(facing[-1]), np.int64), np.zeros((pairs, 2)), np.zeros((pairs, 2, 9)),
     )  # fmt: skip
 
 
 def bond_list(bonds: Bonds) -> BondList:
     """Take the living bonds out of their room."""
-    cell = np.repeat(np.arange(len(bonds.count)), bonds.count)
-    places = bonds.first[cell] + np.arange(len(cell)) - (np.cumsum(bonds.count) - bonds.count)[cell]
+    cell = np.repeat(np.arange(len(bonds.number)), bonds.number)
+    places = bonds.first[cell] + np.arange(len(cell)) - (np.cumsum(bonds.number) - bonds.number)[cell]
     return BondList(cell=cell, **{name: getattr(bonds, name)[places] for name in _BOND_FIELDS})
 
 

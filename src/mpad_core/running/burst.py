@@ -9,23 +9,11 @@ import math
 
 import numpy as np
 
-from mpad_core.arrays import Array, Flags
+from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled, compiled_lean
-from mpad_core.numerics.streams import Word
 from mpad_core.running.clocks import EARLY, LATE, choice, drawn, share_until, used_until
 from mpad_core.running.densities import holds
-from mpad_core.running.layout import (
-    Bonds,
-    Candidates,
-    Clocks,
-    Dice,
-    Limits,
-    Motion,
-    Progress,
-    System,
-    Trail,
-    Work,
-)
+from mpad_core.running.layout import Course, Work
 from mpad_core.running.listing import reaches_out, refresh
 from mpad_core.running.moving import advance, commit, refresh_turns, step_explicitly
 from mpad_core.running.reacting import happen, rates, slip_factors
@@ -40,223 +28,250 @@ _GROWTH = 4.0  # from one part of a sub-step to the next
 
 
 @compiled
-def _work_for(group: int, system: System) -> Work:
-    """Make room for the sub-steps of a group."""
+def _work_for(group: int, course: Course) -> Work:
+    """Make room for the sub-steps of a group; cells that are held are where they are."""
+    system, motion, turn = course.system, course.motion, course.turn
     cells = system.bodies.radius.shape[0]
     members = system.groups.cells[system.groups.first[group] : system.groups.first[group + 1]]
     m = 6 * members.shape[0]
     return Work(
         system.bodies.radius[members], np.empty((m, m)), np.empty((m, m)), np.empty(m), np.empty(m), np.empty(m),
-        np.empty(m), np.empty(m), np.empty(m), np.zeros(m), np.empty(8),
-        np.empty(system.species.site_kind.shape[0]), np.empty(m), np.empty(m), np.empty((2, 3, 6)), np.empty((3, 3)),
-        np.empty(cells), np.empty((cells, 3)),
-        np.empty((cells, 4)), np.empty((cells, 3)), np.empty((cells, 3, 3)), np.empty((cells, 3)),
-        np.empty((cells, 3, 3)),
+        np.empty(m), np.empty(m), np.empty(m), np.zeros(m), np.empty(8), np.empty(system.species.site_kind.shape[0]),
+        np.empty(m), np.empty(m), np.empty((2, 3, 6)), np.empty((3, 3)), np.empty(cells), motion.centre.copy(),
+        motion.orientation.copy(), motion.turn.copy(), turn.copy(), motion.centre.copy(), turn.copy(),
     )  # fmt: skip
 
 
 @compiled_lean
-def _between(cell: int, share: float, motion: Motion, turn: Array, work: Work) -> None:
-    """Write a cell's place and turn at a share of the way that is being tried."""
-    for i in range(3):
-        work.middle[cell, i] = motion.centre[cell, i] + share * (work.centre[cell, i] - motion.centre[cell, i])
-        for j in range(3):
-            work.middle_turn[cell, i, j] = turn[cell, i, j] + share * (work.turn[cell, i, j] - turn[cell, i, j])
+def _between(group: int, share: float, course: Course, work: Work) -> None:
+    """Write a group's places and turns at a share of the way that is being tried."""
+    groups, centre, turn = course.system.groups, course.motion.centre, course.turn
+    for k in range(groups.first[group], groups.first[group + 1]):
+        cell = groups.cells[k]
+        for i in range(3):
+            work.middle[cell, i] = centre[cell, i] + share * (work.centre[cell, i] - centre[cell, i])
+            for j in range(3):
+                work.middle_turn[cell, i, j] = turn[cell, i, j] + share * (work.turn[cell, i, j] - turn[cell, i, j])
 
 
 @compiled_lean
-def _look_ahead(
-    group: int, dt: float, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, work: Work,
-    listed: Candidates, clocks: Clocks, rate: float, ahead: Array,
-) -> tuple[float, int]:  # fmt: skip
-    """Look for the first event on the way that is being tried.
+def _look_ahead(group: int, dt: float, course: Course, work: Work) -> tuple[float, int]:
+    """Look for the first event on the way of dt that is being tried; note each cell's two rates on it.
 
     Returns
     -------
     share
-        Of the way, up to the event; 1 without one. Zero where the rates change too much over it for two points.
+        Of the way, up to the event; 1 without one. Below zero where two rates are too few for so long a way.
     cell
-        Whose event it is; -1 without one. Each cell's two rates are written into `ahead` (N, 2).
+        Whose event it is; -1 without one.
     """
-    groups = system.groups
+    system, bonds, listed, ahead = course.system, course.bonds, course.listed, course.ahead
+    groups, factor = system.groups, work.factor
     first, whose = 1.0, -1
-    factor = work.factor
     for k in range(groups.first[group], groups.first[group + 1]):
         cell = groups.cells[k]
         ahead[cell, 0] = ahead[cell, 1] = 0.0
-        if bonds.count[cell] + listed.count[cell] == 0:
+        if bonds.number[cell] + listed.number[cell] == 0:
             continue
-        place = k - groups.first[group]
-        slip_factors(cell, work.velocity[6 * place : 6 * place + 6], motion.gap[cell], system, factor)
+        place = 6 * (k - groups.first[group])
+        slip_factors(cell, work.velocity[place : place + 6], course.motion.gap[cell], system, factor)
         for point, share in enumerate((EARLY, LATE)):
-            _between(cell, share, motion, turn, work)
+            _between(group, share, course, work)
             ahead[cell, point], _, _ = rates(
-                cell, math.inf, work.middle, work.middle_turn, system, bonds, bound, listed, factor
+                cell, math.inf, work.middle, work.middle_turn, system, bonds, course.bound, listed, factor
             )
         low, high = min(ahead[cell, 0], ahead[cell, 1]), max(ahead[cell, 0], ahead[cell, 1])
-        if high > _STEEP * low and _UNCERTAIN * (high - low) * dt > rate:
+        if high > _STEEP * low and _UNCERTAIN * (high - low) * dt > course.limits.rate:
             return -1.0, -1
-        share = share_until(clocks.left[cell], ahead[cell, 0], ahead[cell, 1], dt)
+        share = share_until(course.clocks.left[cell], ahead[cell, 0], ahead[cell, 1], dt)
         if share < first:
             first, whose = share, cell
     return first, whose
 
 
 @compiled_lean
-def _wind(
-    group: int, share: float, dt: float, whose: int, system: System, key: Word, clocks: Clocks, ahead: Array
-) -> None:
-    """Take what the first `share` of a way of dt uses up from a group's clocks; wind that of the cell whose event it is."""
-    for k in range(system.groups.first[group], system.groups.first[group + 1]):
-        cell = system.groups.cells[k]
+def _wind(cell: int, course: Course) -> None:
+    """Wind a cell's clock for its next event."""
+    clocks = course.clocks
+    clocks.number[cell] += 1
+    clocks.left[cell] = drawn(course.dice.key, course.system.molecules.owner[cell], clocks.number[cell])
+
+
+@compiled_lean
+def _use_up(group: int, share: float, dt: float, whose: int, course: Course) -> None:
+    """Take what the first `share` of a way of dt uses up from a group's clocks; wind the one that has run out."""
+    groups, ahead, clocks = course.system.groups, course.ahead, course.clocks
+    for k in range(groups.first[group], groups.first[group + 1]):
+        cell = groups.cells[k]
         if cell == whose:
-            clocks.count[cell] += 1
-            clocks.left[cell] = drawn(key, system.molecules.owner[cell], clocks.count[cell])
+            _wind(cell, course)
         else:
             clocks.left[cell] -= used_until(share, ahead[cell, 0], ahead[cell, 1], dt)
 
 
 @compiled_lean
-def _let_happen(
-    cell: int, velocity: Array, factor: Array, step: int, time: float, key: Word, system: System, bonds: Bonds, bound: Flags,
-    motion: Motion, turn: Array, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
-) -> None:  # fmt: skip
-    """Draw which event a cell's clock stands for, from the rates of the moment, and let it happen.
+def _let_happen(cell: int, share: float, velocity: Array, factor: Array, course: Course) -> None:
+    """Draw what a cell's clock has run out for, from the rates of the moment, and let it happen.
 
-    The clock has been wound already, so the draw is the one that belongs to the number before.
+    `share` is that of the sub-step. The clock has been wound already: the draw belongs to the number before.
     """
-    slip_factors(cell, velocity, motion.gap[cell], system, factor)
-    total, _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
-    share = choice(key, system.molecules.owner[cell], clocks.count[cell] - 1)
-    _, which, excess = rates(cell, share * total, motion.centre, turn, system, bonds, bound, listed, factor)
+    system, bonds, bound, listed = course.system, course.bonds, course.bound, course.listed
+    centre, turn, key = course.motion.centre, course.turn, course.dice.key
+    slip_factors(cell, velocity, course.motion.gap[cell], system, factor)
+    total, _, _ = rates(cell, math.inf, centre, turn, system, bonds, bound, listed, factor)
+    drawn_share = choice(key, system.molecules.owner[cell], course.clocks.number[cell] - 1)
+    _, which, excess = rates(cell, drawn_share * total, centre, turn, system, bonds, bound, listed, factor)
     if which >= 0:
+        step = course.dice.step + course.progress.beats[0] * course.dice.stride
         happen(
-            cell, which, excess, step, time, motion.centre, turn, key, system, bonds, bound, listed, clocks, progress,
-            events,
+            cell, which, excess, step, share, centre, turn, key, system, bonds, bound, listed, course.clocks,
+            course.progress, course.events,
         )  # fmt: skip
 
 
 @compiled_lean
-def _is_ready(
-    cell: int, system: System, bonds: Bonds, motion: Motion, turn: Array, dice: Dice, listed: Candidates,
-    progress: Progress, events: Array,
-) -> bool:  # fmt: skip
+def _is_ready(cell: int, course: Course) -> bool:
     """Bring a cell's lists up to date; tell whether there is room for them and for an event."""
-    if system.species.site_kind.shape[0] == 0:
+    bonds = course.bonds
+    if course.system.species.site_kind.shape[0] == 0:
         return True
-    if bonds.first[cell] + bonds.count[cell] >= bonds.first[cell + 1] or progress.events[0] >= events.shape[0]:
+    if bonds.first[cell] + bonds.number[cell] >= bonds.first[cell + 1]:
         return False
-    return refresh(cell, system, motion, turn[cell], dice, listed)
+    if course.progress.events[0] >= course.events.shape[0]:
+        return False
+    return refresh(cell, course.system, course.motion, course.turn, course.dice, course.listed)
 
 
 @compiled_lean
-def _strays(group: int, system: System, motion: Motion, work: Work, listed: Candidates) -> int:
-    """Tell whether the way that is tried leads beyond what is listed: 1 if new lists would do, 2 if it is too long."""
-    stray = 0
-    if system.species.site_kind.shape[0] > 0:
-        for k in range(system.groups.first[group], system.groups.first[group + 1]):
-            stray = max(stray, reaches_out(system.groups.cells[k], system, motion, work, listed))
-    return stray
+def _all_ready(group: int, course: Course) -> bool:
+    """Do the same for every cell of a group."""
+    groups, ready = course.system.groups, True
+    for k in range(groups.first[group], groups.first[group + 1]):
+        ready = ready and _is_ready(groups.cells[k], course)
+    return ready
 
 
 @compiled_lean
-def _move_group(
-    group: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits, dice: Dice,
-    listed: Candidates, clocks: Clocks, progress: Progress, events: Array, work: Work, ahead: Array,
-) -> int:  # fmt: skip
+def _strays(group: int, course: Course, work: Work) -> bool:
+    """Tell whether the way that is tried leads beyond what is listed, even if it were listed anew.
+
+    Lists that are merely old are marked, so that they are made anew, and the way is tried again.
+    """
+    groups = course.system.groups
+    for k in range(groups.first[group], groups.first[group + 1]):
+        if reaches_out(groups.cells[k], course.system, work, course.listed):
+            return True
+    return False
+
+
+@compiled_lean
+def _try_part(group: int, part: int, tick: int, course: Course, work: Work) -> float:
+    """Try to move a group over a part of the sub-step, in ticks; give the error of its motion, see `advance`."""
+    limits, system, thermal = course.limits, course.system, course.system.thermal
+    step = course.dice.step + course.progress.beats[0] * course.dice.stride
+    for _ in range(thermal.energy.shape[0]):
+        draw(group, system, course.dice.key, step, tick, tick + part, limits.sub_step, work.noise)
+    return advance(group, limits.sub_step * part / TICKS, system, course.bonds, course.motion, course.turn, work)
+
+
+@compiled_lean
+def _shorter(error: float, course: Course) -> float:
+    """Give the share of a part to try instead of it; 1 if its error will do.
+
+    With thermal motion the error is that of the noise: to shorten what came out large would bias it.
+    """
+    shaken = course.system.thermal.energy.shape[0] > 0
+    if error == math.inf:
+        return 0.5
+    return 1.0 if error <= course.limits.error or shaken else max(0.9 * math.sqrt(course.limits.error / error), 0.1)
+
+
+@compiled_lean
+def _longer(error: float, course: Course) -> float:
+    """Give by how much the next part may be longer than this one."""
+    shaken = course.system.thermal.energy.shape[0] > 0
+    most = course.limits.error
+    return _GROWTH if shaken or error * _GROWTH**2 <= 0.8 * most else max(0.9 * math.sqrt(most / error), 0.5)
+
+
+@compiled_lean
+def _move_group(group: int, course: Course, work: Work) -> int:
     """Move a group to the end of the sub-step that is under way, in as many parts as it takes."""
-    step = dice.step + progress.beats[0] * dice.stride
-    first, last = system.groups.first[group], system.groups.first[group + 1]
-    shaken = system.thermal.energy.shape[0] > 0
+    system, limits, progress = course.system, course.limits, course.progress
     while progress.tick[group] < TICKS:
-        for k in range(first, last):
-            cell = system.groups.cells[k]
-            if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
-                return ROOM_NEEDED
+        if not _all_ready(group, course):
+            return ROOM_NEEDED
         tick = progress.tick[group]
         part = min(progress.part[group], TICKS - tick)
         for k in range(system.thermal.energy.shape[0]):
-            part = min(part, longest_part(group, limits.sub_step, system.thermal.energy[k], system, motion.gap))
-            draw(group, system, dice.key, step, tick, tick + part, limits.sub_step, work.noise)
+            part = min(part, longest_part(group, limits.sub_step, system.thermal.energy[k], system, course.motion.gap))
         dt = limits.sub_step * part / TICKS
-        error = advance(group, dt, system, bonds, motion, turn, work)
-        stray = 0 if error == math.inf else _strays(group, system, motion, work, listed)
-        if stray == 1:
-            for k in range(first, last):
-                listed.near_count[system.groups.cells[k]] = -1
-            continue
-        if error == math.inf or stray == 2 or (error > limits.error and not shaken):
+        error = _try_part(group, part, tick, course, work)
+        shorter = _shorter(error, course)
+        if shorter == 1.0 and _strays(group, course, work):
+            if not _all_ready(group, course):
+                return ROOM_NEEDED
+            shorter = 0.5 if _strays(group, course, work) else 1.0
+        share, whose = (1.0, -1) if shorter < 1.0 else _look_ahead(group, dt, course, work)
+        if shorter < 1.0 or share < 0:
             if part == 1:
                 return NO_BALANCE
-            shorter = 0.5 if error == math.inf or stray == 2 else max(0.9 * math.sqrt(limits.error / error), 0.1)
-            progress.part[group] = max(int(part * shorter), 1)
+            progress.part[group] = max(int(part * min(shorter, 0.5 if share < 0 else 1.0)), 1)
             continue
-        share, whose = _look_ahead(
-            group, dt, system, bonds, bound, motion, turn, work, listed, clocks, limits.rate, ahead
-        )
-        if share < 0 and part > 1:
-            progress.part[group] = part // 2
+        done = part if whose < 0 else min(max(math.ceil(share * part), 1), part)
+        if done < part and _try_part(group, done, tick, course, work) == math.inf:
+            progress.part[group] = max(done // 2, 1)
             continue
-        done = part
-        if whose >= 0:
-            done = min(max(math.ceil(share * part), 1), part)
-            if done < part:
-                for k in range(system.thermal.energy.shape[0]):
-                    draw(group, system, dice.key, step, tick, tick + done, limits.sub_step, work.noise)
-                if advance(group, limits.sub_step * done / TICKS, system, bonds, motion, turn, work) == math.inf:
-                    progress.part[group] = max(done // 2, 1)
-                    continue
-        _wind(group, abs(share), dt, whose, system, dice.key, clocks, ahead)
-        commit(group, limits.sub_step * done / TICKS, system, motion, turn, work)
+        _use_up(group, share, dt, whose, course)
+        commit(group, limits.sub_step * done / TICKS, system, course.motion, course.turn, work)
         if whose >= 0:
             place = 6 * system.groups.place[whose]
-            time = (tick + share * part) / TICKS
-            _let_happen(
-                whose, work.velocity[place : place + 6], work.factor, step, time, dice.key, system, bonds, bound, motion, turn,
-                listed, clocks, progress, events,
-            )  # fmt: skip
-        longer = _GROWTH if error <= 0.05 * limits.error or shaken else max(0.9 * math.sqrt(limits.error / error), 0.5)
+            own = work.velocity[place : place + 6]
+            _let_happen(whose, (tick + share * part) / TICKS, own, work.factor, course)
         progress.tick[group] = tick + done
-        progress.part[group] = min(int(part * longer) + 1, TICKS)
+        progress.part[group] = min(int(part * _longer(error, course)) + 1, TICKS)
     return REACHED
 
 
 @compiled_lean
-def _move_explicitly(
-    group: int, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits, dice: Dice,
-    listed: Candidates, clocks: Clocks, progress: Progress, events: Array, work: Work, ahead: Array,
-) -> int:  # fmt: skip
+def _move_explicitly(group: int, course: Course, work: Work) -> int:
     """Move a group to the end of the sub-step that is under way by explicit steps, for comparison.
 
     Rates are those of the start of every few steps, and an event happens at the end of the step in which it is due.
     """
-    step = dice.step + progress.beats[0] * dice.stride
-    first, last = system.groups.first[group], system.groups.first[group + 1]
-    factor = work.factor
-    steps = max(round(limits.sub_step / limits.euler[0]), 1)
-    dt = limits.sub_step / steps
+    system, motion, progress, clocks, ahead = course.system, course.motion, course.progress, course.clocks, course.ahead
+    groups = system.groups
+    first, last = groups.first[group], groups.first[group + 1]
+    steps = max(round(course.limits.sub_step / course.limits.euler[0]), 1)
+    dt = course.limits.sub_step / steps
     while progress.tick[group] < TICKS:
         done = progress.part[group] % TICKS  # steps of this sub-step
         for k in range(first, last):
-            cell = system.groups.cells[k]
+            cell = groups.cells[k]
             if done % _HELD_STEPS == 0 or ahead[cell, 1] < 0:
-                if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
+                if not _is_ready(cell, course):
                     return ROOM_NEEDED
-                slip_factors(cell, motion.velocity[cell], motion.gap[cell], system, factor)
-                ahead[cell, 0], _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
+                slip_factors(cell, motion.velocity[cell], motion.gap[cell], system, work.factor)
+                ahead[cell, 0], _, _ = rates(
+                    cell,
+                    math.inf,
+                    motion.centre,
+                    course.turn,
+                    system,
+                    course.bonds,
+                    course.bound,
+                    course.listed,
+                    work.factor,
+                )
                 ahead[cell, 1] = 0.0
             clocks.left[cell] -= ahead[cell, 0] * dt
-        step_explicitly(group, dt, system, bonds, motion, turn, work)
-        commit(group, dt, system, motion, turn, work)
+        step_explicitly(group, dt, system, course.bonds, motion, course.turn, work)
+        commit(group, dt, system, motion, course.turn, work)
         for k in range(first, last):
-            cell = system.groups.cells[k]
+            cell = groups.cells[k]
             if not clocks.left[cell] > 0:
-                clocks.count[cell] += 1
-                clocks.left[cell] = drawn(dice.key, system.molecules.owner[cell], clocks.count[cell])
-                _let_happen(
-                    cell, motion.velocity[cell], factor, step, (done + 1) / steps, dice.key, system, bonds, bound, motion,
-                    turn, listed, clocks, progress, events,
-                )  # fmt: skip
+                _wind(cell, course)
+                _let_happen(cell, (done + 1) / steps, motion.velocity[cell], work.factor, course)
                 ahead[cell, 1] = -1.0
         progress.part[group] = done + 1 if done + 1 < steps else TICKS
         progress.tick[group] = (done + 1) * (TICKS // steps) if done + 1 < steps else TICKS
@@ -264,54 +279,36 @@ def _move_explicitly(
 
 
 @compiled_lean
-def _wait(
-    cell: int, slot: int, velocity: Array, factor: Array, system: System, bonds: Bonds, bound: Flags, motion: Motion, turn: Array, limits: Limits,
-    dice: Dice, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
-) -> int:  # fmt: skip
+def _wait(cell: int, slot: int, at_rest: Array, factor: Array, course: Course) -> int:
     """Let happen what happens to a cell that does not move, up to the end of the sub-step that is under way."""
-    step = dice.step + progress.beats[0] * dice.stride
+    system, motion, progress, clocks = course.system, course.motion, course.progress, course.clocks
     while progress.tick[slot] < TICKS:
-        if not _is_ready(cell, system, bonds, motion, turn, dice, listed, progress, events):
+        if not _is_ready(cell, course):
             return ROOM_NEEDED
-        slip_factors(cell, velocity, motion.gap[cell], system, factor)
-        total, _, _ = rates(cell, math.inf, motion.centre, turn, system, bonds, bound, listed, factor)
+        slip_factors(cell, at_rest, motion.gap[cell], system, factor)
+        total, _, _ = rates(
+            cell, math.inf, motion.centre, course.turn, system, course.bonds, course.bound, course.listed, factor
+        )
         part = TICKS - progress.tick[slot]
-        dt = limits.sub_step * part / TICKS
+        dt = course.limits.sub_step * part / TICKS
         share = share_until(clocks.left[cell], total, total, dt)
         if share > 1:
             clocks.left[cell] -= total * dt
             progress.tick[slot] = TICKS
             continue
-        clocks.count[cell] += 1
-        clocks.left[cell] = drawn(dice.key, system.molecules.owner[cell], clocks.count[cell])
-        time = (progress.tick[slot] + share * part) / TICKS
-        _let_happen(
-            cell,
-            velocity,
-            factor,
-            step,
-            time,
-            dice.key,
-            system,
-            bonds,
-            bound,
-            motion,
-            turn,
-            listed,
-            clocks,
-            progress,
-            events,
-        )
+        _wind(cell, course)
+        _let_happen(cell, (progress.tick[slot] + share * part) / TICKS, at_rest, factor, course)
         progress.tick[slot] += min(max(math.ceil(share * part), 1), part)
     return REACHED
 
 
 @compiled_lean
-def _must_end(system: System, motion: Motion, limits: Limits) -> bool:
-    """Tell whether the frozen coupling has been used far enough, or a cell is about to leave what is known of the wall."""
+def _must_end(course: Course) -> bool:
+    """Tell whether the frozen coupling has been used far enough, or a cell leaves the lattice of the wall."""
+    motion, limits = course.motion, course.limits
     start = limits.start
     for cell in range(start.shape[0]):
-        if not holds(system.densities, cell, motion.centre[cell, 0], motion.centre[cell, 1]):
+        if not holds(course.system.densities, cell, motion.centre[cell, 0], motion.centre[cell, 1]):
             return True
         if motion.gap[cell] < limits.gap_low[cell] or motion.gap[cell] > limits.gap_high[cell]:
             return True
@@ -326,17 +323,18 @@ def _must_end(system: System, motion: Motion, limits: Limits) -> bool:
 
 
 @compiled_lean
-def _fits(group: int, system: System, motion: Motion, work: Work) -> bool:
+def _fits(group: int, course: Course, work: Work) -> bool:
     """Tell whether a group's frozen coupling fits its heights."""
-    resistance(group, system, motion.gap, work.functions, work.matrix, work.right)
+    resistance(group, course.system, course.motion.gap, work.functions, work.matrix, work.right)
     return is_positive_definite(work.matrix)
 
 
 @compiled
-def _note(motion: Motion, stride: int, trail: Trail, progress: Progress) -> None:
+def _note(course: Course) -> None:
     """Note where the cells are."""
+    motion, trail, progress = course.motion, course.trail, course.progress
     at = progress.trail[0]
-    trail.step[at] = progress.beats[0] * stride
+    trail.step[at] = progress.beats[0] * course.dice.stride
     trail.centre[at] = motion.centre
     trail.gap[at] = motion.gap
     trail.orientation[at] = motion.orientation
@@ -345,57 +343,54 @@ def _note(motion: Motion, stride: int, trail: Trail, progress: Progress) -> None
 
 
 @compiled
-def burst(
-    system: System, bonds: Bonds, bound: Flags, motion: Motion, limits: Limits, dice: Dice, listed: Candidates,
-    clocks: Clocks, progress: Progress, trail: Trail, events: Array,
-) -> tuple[int, int]:  # fmt: skip
-    """Run sub-steps until a limit is met; change all that is not frozen, and fill `trail` and `events`.
+def _sub_step(course: Course, works: list[Work], at_rest: Array, factor: Array) -> tuple[int, int]:
+    """Go through what is left of the sub-step that is under way; see `burst`."""
+    groups, progress = course.system.groups, course.progress
+    number = groups.first.shape[0] - 1
+    for group in range(number):
+        if progress.tick[group] == 0 and not _fits(group, course, works[group]):
+            return NOT_POSITIVE, group
+        if course.limits.euler.shape[0] == 0:
+            outcome = _move_group(group, course, works[group])
+        else:
+            outcome = _move_explicitly(group, course, works[group])
+        if outcome != REACHED:
+            return outcome, group
+    for cell in range(groups.place.shape[0]):
+        if groups.place[cell] < 0 and _wait(cell, number + cell, at_rest, factor, course) != REACHED:
+            return ROOM_NEEDED, -1
+    return REACHED, -1
+
+
+@compiled
+def burst(course: Course) -> tuple[int, int]:
+    """Run sub-steps until a limit is met; change all that is not frozen, and fill the trail and the table of events.
 
     Returns
     -------
     outcome
         REACHED; ROOM_NEEDED where bonds, candidates or events may not fit, after which the burst may be called again,
-        with more room, and goes on; NOT_POSITIVE when the frozen coupling no longer fits, at the end of a sub-step;
-        NO_BALANCE when no part of a sub-step however short balances the loads, which leaves the state unusable.
+        with more room, and goes on; NOT_POSITIVE when the frozen coupling no longer fits, before a sub-step in which
+        nothing has happened yet; NO_BALANCE when no part of a sub-step however short balances the loads, which leaves
+        the state unusable.
     group
         The group that was refused.
     """
-    cells, groups = motion.gap.shape[0], system.groups.first.shape[0] - 1
-    turn = np.empty((cells, 3, 3))
-    refresh_turns(motion, turn)
-    ahead = np.zeros((cells, 2))
-    at_rest, factor = np.zeros(6), np.empty(system.species.site_kind.shape[0])
-    listed.near_count[:] = -1
-    works = [_work_for(group, system) for group in range(groups)]
+    progress, limits = course.progress, course.limits
+    refresh_turns(course.motion, course.turn)
+    course.listed.near_number[:] = -1
+    course.listed.facing_number[:] = -1
+    works = [_work_for(group, course) for group in range(course.system.groups.first.shape[0] - 1)]
+    at_rest, factor = np.zeros(6), np.empty(course.system.species.site_kind.shape[0])
     while progress.beats[0] < limits.most:
-        for group in range(groups):
-            if progress.tick[group] == 0 and not _fits(group, system, motion, works[group]):
-                return NOT_POSITIVE, group
-            if limits.euler.shape[0] == 0:
-                outcome = _move_group(
-                    group, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress, events,
-                    works[group], ahead,
-                )  # fmt: skip
-            else:
-                outcome = _move_explicitly(
-                    group, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress, events,
-                    works[group], ahead,
-                )  # fmt: skip
-            if outcome != REACHED:
-                return outcome, group
-        for cell in range(cells):
-            if system.groups.place[cell] < 0:
-                outcome = _wait(
-                    cell, groups + cell, at_rest, factor, system, bonds, bound, motion, turn, limits, dice, listed, clocks, progress,
-                    events,
-                )  # fmt: skip
-                if outcome != REACHED:
-                    return outcome, -1
+        outcome, group = _sub_step(course, works, at_rest, factor)
+        if outcome != REACHED:
+            return outcome, group
         progress.beats[0] += 1
         progress.tick[:] = 0
-        ends = _must_end(system, motion, limits) or progress.beats[0] == limits.most
-        if ends or progress.beats[0] % trail.every == 0:
-            _note(motion, dice.stride, trail, progress)
+        ends = _must_end(course) or progress.beats[0] == limits.most
+        if ends or progress.beats[0] % course.trail.every == 0:
+            _note(course)
         if ends:
             break
     return REACHED, -1

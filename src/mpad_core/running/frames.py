@@ -48,8 +48,11 @@ def _frame(
 def _bond_counts(before: State, after: State, time: float) -> Any:
     """Count each cell's bonds at a time: those before, and the events since."""
     counts = before.bond_counts()
-    past = after.events[after.events["time"] <= time]
-    np.add.at(counts, past["cell"], np.where(past["kind"] == 0, 1, -1))
+    past = after.events[(after.events["time"] <= time) & (after.events["kind"] < 2)]
+    changes = np.where(past["kind"] == 0, 1, -1)
+    bridges = past["partner"] >= 0
+    np.add.at(counts, past["cell"], changes)
+    np.add.at(counts, past["partner"][bridges], changes[bridges])
     return counts
 
 

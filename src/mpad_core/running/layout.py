@@ -52,7 +52,7 @@ class Bonds(NamedTuple):
     """Living bonds, each with the cell that keeps it; a cell's stand together, oldest first."""
 
     first: Indices  # (N + 1,) each cell's first place; its room ends at the next cell's
-    count: Indices  # (N,) how many live
+    number: Indices  # (N,) of living bonds
     site: Indices  # (B,) index into Molecules
     species: Indices  # (B,)
     state: Indices  # (B,) inner state
@@ -70,6 +70,13 @@ class Contacts(NamedTuple):
     reach: float  # µm, tip gap beyond which there is no force; minus infinity without a law
     pairs: Indices  # (P, 2) cells that may come into contact during the burst, in the order of the first one's group
     pair_first: Indices  # (groups + 1,) each group's first pair
+
+
+class Neighbours(NamedTuple):
+    """Pairs of cells that may come to bind to each other during a burst; each has a keeper, which is not held."""
+
+    first: Indices  # (N + 1,) each keeper's first pair
+    partner: Indices  # (P,) the other cell
 
 
 class Groups(NamedTuple):
@@ -96,6 +103,7 @@ class System(NamedTuple):
     molecules: Molecules
     species: Species
     contacts: Contacts
+    neighbours: Neighbours
     groups: Groups
     thermal: Thermal
     densities: Densities  # of the wall's sites around each cell, by the one that the on-rate is given at
@@ -144,7 +152,7 @@ class Clocks(NamedTuple):
     """Each cell's clock of events: the next one happens when the hazard integrated since the last has used it up."""
 
     left: Array  # (N,) of a random number that is exponential with mean one
-    count: Indices  # (N,) numbers drawn so far, by which the next ones are keyed
+    number: Indices  # (N,) of numbers drawn so far, by which the next ones are keyed
 
 
 class Progress(NamedTuple):
@@ -192,10 +200,10 @@ class Dice(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """What may bind to what: the molecules of each cell near the wall, or near another cell, and how long they stand."""
+    """What may bind to what: molecules of each cell near the wall, or near another cell, and how long they stand."""
 
     first: Indices  # (N + 1,) each cell's first place; its room ends at the next cell's
-    count: Indices  # (N,)
+    number: Indices  # (N,)
     site: Indices  # (C,)
     species: Indices  # (C,)
     ligand: Indices  # (C,) as in Bonds
@@ -203,9 +211,32 @@ class Candidates(NamedTuple):
     x: Array  # (C,) µm, of the wall's molecule, where they are told apart
     y: Array  # (C,)
     near_first: Indices  # (N + 1,) as first, for the molecules that are only near
-    near_count: Indices  # (N,)
+    near_number: Indices  # (N,)
     near: Indices  # (S,) sites
     slack: Array  # (N, 2) µm, how much nearer molecules may come before candidates, or near ones, must be listed anew
     lever: Array  # (N, 2) µm, how far from the axis of the cell's turn the first to come would be
     centre: Array  # (N, 2, 3) µm, of the cell when they were listed
     turn: Array  # (N, 2, 3) motion.turn at that time
+    facing_first: Indices  # (2P + 1,) of the molecules of a pair's keeper, and of its partner, that face the other
+    facing_number: Indices  # (2P,); a first one below zero: not listed yet
+    facing: Indices  # (F,) sites
+    pair_slack: Array  # (P, 2) as slack
+    pair_from: Array  # (P, 2, 9) relative place and both turns at that time
+
+
+class Course(NamedTuple):
+    """All that a burst has to do with."""
+
+    system: System
+    limits: Limits
+    dice: Dice
+    motion: Motion
+    turn: Array  # (N, 3, 3) the cells' rotation matrices
+    bonds: Bonds
+    bound: Flags  # (S,) whether each molecule is bound
+    listed: Candidates
+    clocks: Clocks
+    ahead: Array  # (N, 2) 1/s, each cell's rates on the way that is being tried
+    progress: Progress
+    trail: Trail
+    events: Array  # of BOND_EVENT

@@ -10,12 +10,11 @@ import math
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled_lean
 from mpad_core.running.densities import density_at
+from mpad_core.running.facing import FIRST, MARGIN, NEAR, NEAR_MARGIN, add_facing, append, list_facing, nearer
 from mpad_core.running.layout import Candidates, Dice, Motion, System, Work
 from mpad_core.running.places import SQUARE, height_of, ligand_at, ligands_of, place_of
 
-NEAR_MARGIN = 0.3  # µm: molecules this far out of reach are near
-MARGIN = 0.02  # µm: and these are candidates
-_NEAR, _FIRST = 1, 0  # levels of the two lists
+_OUTWORN = -1.0  # as a slack: the list must be made anew
 
 
 @compiled_lean
@@ -40,12 +39,12 @@ def _nearer(cell: int, level: int, centre: Array, rotation: Array, system: Syste
     lever = listed.lever[cell, level]
     drop = max(listed.centre[cell, level, 2] - centre[cell, 2], 0.0)
     nearer = drop + math.sqrt(tx * tx + ty * ty) * lever
-    if level == _FIRST and system.species.pairwise.any():
+    if level == FIRST and system.species.pairwise.any():
         shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
         slip_x = centre[cell, 0] - listed.centre[cell, level, 0] - shell * ty
         slip_y = centre[cell, 1] - listed.centre[cell, level, 1] + shell * tx
         nearer += math.sqrt(slip_x * slip_x + slip_y * slip_y) + abs(tz) * lever
-    return nearer
+    return float(nearer)
 
 
 @compiled_lean
@@ -68,30 +67,14 @@ def _list_near(cell: int, lowest: float, system: System, motion: Motion, turn: A
     shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
     bottom = motion.centre[cell, 2] - shell
     highest = lowest + NEAR_MARGIN
-    _mark(cell, _NEAR, max(NEAR_MARGIN, bottom - lowest) - MARGIN, highest, system, motion, listed)
+    _mark(cell, NEAR, max(NEAR_MARGIN, bottom - lowest) - MARGIN, highest, system, motion, listed)
     at = listed.near_first[cell]
     if bottom < highest:
         for site in range(system.molecules.first[cell], system.molecules.first[cell + 1]):
             if height_of(site, motion.centre[cell], turn, system.molecules) < highest:
                 listed.near[at] = site
                 at += 1
-    listed.near_count[cell] = at - listed.near_first[cell]
-
-
-@compiled_lean
-def _append(cell: int, site: int, kind: int, ligand: int, partner: int, x: float, y: float, listed: Candidates) -> bool:
-    """Add a candidate; tell whether there was room."""
-    at = listed.first[cell] + listed.count[cell]
-    if at >= listed.first[cell + 1]:
-        return False
-    listed.site[at] = site
-    listed.species[at] = kind
-    listed.ligand[at] = ligand
-    listed.partner[at] = partner
-    listed.x[at] = x
-    listed.y[at] = y
-    listed.count[cell] += 1
-    return True
+    listed.near_number[cell] = at - listed.near_first[cell]
 
 
 @compiled_lean
@@ -109,7 +92,7 @@ def _add_ligands(
                     continue
                 if mark >= density_at(system.densities, cell, kind, lx, ly):
                     continue
-                if not _append(cell, site, kind, ligand, -1, lx, ly, listed):
+                if not append(cell, site, kind, ligand, -1, lx, ly, listed):
                     return False
     return True
 
@@ -122,10 +105,10 @@ def _list_candidates(
     molecules, species = system.molecules, system.species
     centre = motion.centre[cell]
     bottom = centre[2] - system.bodies.radius[cell] - system.bodies.roughness[cell]
-    _mark(cell, _FIRST, max(MARGIN, bottom - lowest), lowest + MARGIN, system, motion, listed)
-    listed.count[cell] = 0
+    _mark(cell, FIRST, max(MARGIN, bottom - lowest), lowest + MARGIN, system, motion, listed)
+    listed.number[cell] = 0
     first = listed.near_first[cell]
-    for n in range(first, first + listed.near_count[cell]):
+    for n in range(first, first + listed.near_number[cell]):
         site = listed.near[n]
         if height_of(site, centre, turn, molecules) >= lowest + MARGIN:
             continue
@@ -139,39 +122,63 @@ def _list_candidates(
             if species.pairwise[kind]:
                 room = _add_ligands(cell, site, kind, x, y, gap, system, dice, listed)
             else:
-                room = _append(cell, site, kind, -1, -1, 0.0, 0.0, listed)
+                room = append(cell, site, kind, -1, -1, 0.0, 0.0, listed)
             if not room:
                 return False
     return True
 
 
 @compiled_lean
-def refresh(cell: int, system: System, motion: Motion, turn: Array, dice: Dice, listed: Candidates) -> bool:
-    """See to it that all molecules of a cell that can bind are listed; tell whether there was room.
-
-    A `near_count` below zero says that nothing has been listed yet.
-    """
-    if system.molecules.first[cell] == system.molecules.first[cell + 1]:
-        listed.near_count[cell] = 0
-        listed.slack[cell] = math.inf
-        return True
-    lowest = reach_height(system)
-    centre, rotation = motion.centre, motion.turn
-    if (
-        listed.near_count[cell] < 0
-        or _nearer(cell, _NEAR, centre, rotation, system, listed) > listed.slack[cell, _NEAR]
-    ):
-        _list_near(cell, lowest, system, motion, turn, listed)
-    elif not _nearer(cell, _FIRST, centre, rotation, system, listed) > listed.slack[cell, _FIRST]:
-        return True
-    return _list_candidates(cell, lowest, system, motion, turn, dice, listed)
+def _list_pairs(cell: int, system: System, motion: Motion, turn: Array, listed: Candidates) -> bool:
+    """List anew what faces a cell's partners where that may be too short; tell whether candidates must be, too."""
+    stale = False
+    for pair in range(system.neighbours.first[cell], system.neighbours.first[cell + 1]):
+        unlisted = listed.facing_number[2 * pair] < 0
+        way = 0.0 if unlisted else nearer(pair, NEAR, cell, motion.centre, motion.turn, system, listed)
+        if unlisted or way > listed.pair_slack[pair, NEAR]:
+            list_facing(pair, cell, motion.centre, motion.turn, turn, system, listed)
+            stale = True
+        elif nearer(pair, FIRST, cell, motion.centre, motion.turn, system, listed) > listed.pair_slack[pair, FIRST]:
+            stale = True
+    return stale
 
 
 @compiled_lean
-def reaches_out(cell: int, system: System, motion: Motion, work: Work, listed: Candidates) -> int:
-    """Tell whether the way that is tried leads a cell beyond its list: 0 no, 1 a new list would do, 2 it is too long."""
-    slack = listed.slack[cell, _FIRST]
-    if not _nearer(cell, _FIRST, work.centre, work.rotation, system, listed) > slack:
-        return 0
-    way = _nearer(cell, _FIRST, motion.centre, motion.turn, system, listed)
-    return 1 if way > 0 else 2
+def refresh(cell: int, system: System, motion: Motion, turn: Array, dice: Dice, listed: Candidates) -> bool:
+    """See to it that all molecules of a cell that can bind are listed; tell whether there was room.
+
+    A `near_number` below zero says that nothing has been listed yet. `turn` (N, 3, 3) are the cells' rotations.
+    """
+    if system.molecules.first[cell] == system.molecules.first[cell + 1]:
+        listed.near_number[cell] = 0
+        listed.slack[cell, NEAR] = listed.slack[cell, FIRST] = math.inf
+        return True
+    lowest = reach_height(system)
+    stale = _list_pairs(cell, system, motion, turn, listed)
+    unlisted = listed.near_number[cell] < 0
+    if unlisted or _nearer(cell, NEAR, motion.centre, motion.turn, system, listed) > listed.slack[cell, NEAR]:
+        _list_near(cell, lowest, system, motion, turn[cell], listed)
+    elif not stale and not (
+        _nearer(cell, FIRST, motion.centre, motion.turn, system, listed) > listed.slack[cell, FIRST]
+    ):
+        return True
+    if not _list_candidates(cell, lowest, system, motion, turn[cell], dice, listed):
+        return False
+    for pair in range(system.neighbours.first[cell], system.neighbours.first[cell + 1]):
+        if not add_facing(pair, cell, motion.centre, motion.turn, turn, system, listed):
+            return False
+    return True
+
+
+@compiled_lean
+def reaches_out(cell: int, system: System, work: Work, listed: Candidates) -> bool:
+    """Tell whether a way that is tried leads a cell beyond its lists, and have them made anew if it does."""
+    if system.species.site_kind.shape[0] == 0:
+        return False
+    beyond = bool(_nearer(cell, FIRST, work.centre, work.rotation, system, listed) > listed.slack[cell, FIRST])
+    for pair in range(system.neighbours.first[cell], system.neighbours.first[cell + 1]):
+        way = nearer(pair, FIRST, cell, work.centre, work.rotation, system, listed)
+        beyond = beyond or way > listed.pair_slack[pair, FIRST]
+    if beyond:
+        listed.slack[cell, FIRST] = _OUTWORN
+    return beyond

@@ -15,13 +15,14 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.tables import value
-from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, coupler, drift_of, lone_velocity
+from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, coupler, drift_of
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, Way
 from mpad_core.physics.wall_density import Rasters, rasters
 from mpad_core.running import assembly, pace
 from mpad_core.running.burst import NO_BALANCE, NOT_POSITIVE, ROOM_NEEDED, burst
-from mpad_core.running.layout import Clocks, Dice, Limits, Motion, Progress, Trail
+from mpad_core.running.capturing import with_captures
+from mpad_core.running.layout import Clocks, Course, Dice, Limits, Motion, Progress, Trail
 from mpad_core.running.moving import refresh_turns
 from mpad_core.running.reacting import TENSION, bond_length
 
@@ -45,7 +46,7 @@ class Machine:
         motion = assembly.motion_of(state)
         refresh_turns(motion, turns)
         laid = assembly.room_for(self.fixed, bonds, len(turns)).bonds
-        places = [b for c in range(len(turns)) for b in range(laid.first[c], laid.first[c] + laid.count[c])]
+        places = [b for c in range(len(turns)) for b in range(laid.first[c], laid.first[c] + laid.number[c])]
         molecules, species = self.fixed.molecules, self.fixed.species
         lengths = [
             bond_length(b, c, motion.centre, turns, laid, molecules) for b, c in zip(places, bonds.cell, strict=True)
@@ -135,10 +136,12 @@ def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits, s
     dice = Dice(fixed.key, state.step, stride)
     outcome, times, bonds, events = ROOM_NEEDED, 1, state.bonds, []
     while outcome == ROOM_NEEDED:
-        room = assembly.room_for(fixed, bonds, cells, times)
-        outcome, group = burst(
-            data, room.bonds, room.bound, motion, bounds, dice, room.candidates, clocks, progress, trail, room.events
-        )
+        room = assembly.room_for(fixed, bonds, cells, data.neighbours, times)
+        course = Course(
+            data, bounds, dice, motion, np.empty((cells, 3, 3)), room.bonds, room.bound, room.candidates, clocks,
+            np.zeros((cells, 2)), progress, trail, room.events,
+        )  # fmt: skip
+        outcome, group = burst(course)
         bonds = assembly.bond_list(room.bonds)
         events.append(room.events[: progress.events[0]])
         progress.events[0] = 0
@@ -177,12 +180,12 @@ def _next(machine: Machine, state: State, made: _Done, coupling: Coupling, strid
         mean_loads=motion.impulse / lasted,
         bonds=made.bonds,
         clocks=made.clocks.left,
-        draws=made.clocks.count.astype(float),
+        draws=made.clocks.number.astype(float),
         guess=coupling.guess,
         events=_in_order(made.events, state.zero, stride, machine.pace.grain),
         way=_way(state, made, machine.pace.grain),
     )
-    return _with_captures(machine.problem, following)
+    return with_captures(machine.problem, following)
 
 
 def _in_order(events: Any, zero: int, stride: int, grain: float) -> Any:
@@ -197,21 +200,10 @@ def _way(state: State, made: _Done, grain: float) -> Way:
     noted, trail = int(made.progress.trail[0]), made.trail
     steps = state.step + trail.step[:noted]
     return Way(
-        steps=steps, times=(steps - state.zero) * grain, centres=trail.centre[:noted], wall_gaps=trail.gap[:noted],
-        orientations=trail.orientation[:noted], turns=trail.turn[:noted],
-    )  # fmt: skip
-
-
-def _with_captures(problem: Problem, state: State) -> State:
-    """Keep account of who is caught: bound without a break for a while, and slow over that while."""
-    bound = state.bond_counts() > 0
-    since = np.where(bound, np.minimum(state.bound_since, state.time), np.inf)
-    at = np.where(np.isinf(state.bound_since) | ~bound, state.centres[:, 0], state.bound_at)
-    caught = np.where(bound, state.caught_since, np.inf)
-    for i in np.flatnonzero(bound & (state.time - since >= problem.caught.bound_for)):
-        speed = abs(state.centres[i, 0] - at[i]) / max(state.time - since[i], 1e-300)
-        place = float(problem.radii[i]), float(state.centres[i, 2]), float(state.wall_gaps[i])
-        if speed < problem.caught.slower_than * lone_velocity(problem.setting, *place):
-            caught[i] = min(caught[i], state.time)
-        since[i], at[i] = state.time, state.centres[i, 0]  # a new while begins
-    return evolve(state, bound_since=since, bound_at=at, caught_since=caught)
+        steps=steps,
+        times=np.asarray((steps - state.zero) * grain, float),
+        centres=trail.centre[:noted],
+        wall_gaps=trail.gap[:noted],
+        orientations=trail.orientation[:noted],
+        turns=trail.turn[:noted],
+    )

@@ -153,7 +153,7 @@ def _add_wall_bonds(cell: int, o: int, system: System, bonds: Bonds, work: Work)
     )  # fmt: skip
     site, species, state, partner, anchor = bonds.site, bonds.species, bonds.state, bonds.partner, bonds.anchor
     load, stiffness, centre, turn = work.load, work.stiffness, work.middle[cell], work.middle_turn[cell]
-    for bond in range(bonds.first[cell], bonds.first[cell] + bonds.count[cell]):
+    for bond in range(bonds.first[cell], bonds.first[cell] + bonds.number[cell]):
         ax, ay, az = arms[site[bond], 0], arms[site[bond], 1], arms[site[bond], 2]
         bx = turn[0, 0] * ax + turn[0, 1] * ay + turn[0, 2] * az
         by = turn[1, 0] * ax + turn[1, 1] * ay + turn[1, 2] * az
@@ -204,7 +204,7 @@ def _add_bridge(
 
 @compiled_lean
 def _add_loads(group: int, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work) -> None:
-    """Write all loads but the fluid's, and their stiffness, for the group displaced and turned by `work.moved` (6n,)."""
+    """Write all loads but the fluid's, and their stiffness, for the group moved and turned by `work.moved` (6n,)."""
     bodies, groups, contacts = system.bodies, system.groups, system.contacts
     load, stiffness, moved = work.load, work.stiffness, work.moved
     start = groups.first[group]
@@ -220,7 +220,7 @@ def _add_loads(group: int, system: System, bonds: Bonds, motion: Motion, turn: A
             force, slope = value_and_slope(contacts.law, 0, 0, tip_gap)
             load[o + 2] += force
             stiffness[o + 2, o + 2] -= slope
-        if bonds.count[cell] > 0:
+        if bonds.number[cell] > 0:
             _pose(cell, place, moved, motion, turn, work)
             _add_wall_bonds(cell, o, system, bonds, work)
             for k in range(bonds.bridges[cell]):

@@ -18,7 +18,7 @@ _LIGANDS = int(Stream.LIGANDS)
 def height_of(site: int, centre: Array, turn: Array, molecules: Molecules) -> float:
     """Give the height of a molecule of a cell at `centre` (3,), turned by `turn` (3, 3)."""
     arm = molecules.arm
-    return centre[2] + turn[2, 0] * arm[site, 0] + turn[2, 1] * arm[site, 1] + turn[2, 2] * arm[site, 2]
+    return float(centre[2] + turn[2, 0] * arm[site, 0] + turn[2, 1] * arm[site, 1] + turn[2, 2] * arm[site, 2])
 
 
 @compiled_inline

@@ -17,9 +17,13 @@ FORMED, BROKEN, CHANGED = 0, 1, 2  # kinds of event
 
 @compiled_inline
 def bond_length(bond: int, cell: int, centre: Array, turn: Array, bonds: Bonds, molecules: Molecules) -> float:
-    """Give the length of a cell's bond to the wall."""
+    """Give the length of a cell's bond."""
     x, y, z = place_of(bonds.site[bond], centre[cell], turn[cell], molecules)
-    return distance(x, y, z, bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2])
+    partner = bonds.partner[bond]
+    ex, ey, ez = bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2]
+    if partner >= 0:
+        ex, ey, ez = place_of(bonds.ligand[bond], centre[partner], turn[partner], molecules)
+    return distance(x, y, z, ex, ey, ez)
 
 
 @compiled_inline
@@ -36,9 +40,9 @@ def _leaving_rate(kind: int, state: int, length: float, species: Species) -> flo
 @compiled_lean
 def _is_taken(kind: int, ligand: int, bonds: Bonds) -> bool:
     """Tell whether one of the wall's molecules is bound already, to whichever cell."""
-    for cell in range(bonds.count.shape[0]):
+    for cell in range(bonds.number.shape[0]):
         first = bonds.first[cell]
-        for bond in range(first, first + bonds.count[cell]):
+        for bond in range(first, first + bonds.number[cell]):
             if bonds.ligand[bond] == ligand and bonds.species[bond] == kind and bonds.partner[bond] < 0:
                 return True
     return False
@@ -93,7 +97,7 @@ def rates(
     # taken out of their tuples here, since doing so costs a hundred sums
     molecules, species, densities, tips = system.molecules, system.species, system.densities, system.bodies.wall_tips
     total = 0.0
-    first, count = bonds.first[cell], bonds.count[cell]
+    first, count = bonds.first[cell], bonds.number[cell]
     for bond in range(first, first + count):
         kind = bonds.species[bond]
         length = bond_length(bond, cell, centre, turn, bonds, molecules)
@@ -102,17 +106,23 @@ def rates(
             return total, bond - first, total - stop
     first = listed.first[cell]
     site_of, kind_of, to_x, to_y = listed.site, listed.species, listed.x, listed.y
+    ligand_of, partner_of = listed.ligand, listed.partner
     pairwise, reach, least = species.pairwise, species.reach, species.least_length
     place, turned = centre[cell], turn[cell]
-    for candidate in range(first, first + listed.count[cell]):
+    for candidate in range(first, first + listed.number[cell]):
         site = site_of[candidate]
         if bound[site]:
             continue
         kind = kind_of[candidate]
         x, y, z = place_of(site, place, turned, molecules)
         pair = pairwise[kind] != 0
-        lateral = math.sqrt((x - to_x[candidate]) ** 2 + (y - to_y[candidate]) ** 2)
-        length = _birth_length(pair, lateral, z - tips, reach[kind], least[kind])
+        ex, ey, ez, partner = to_x[candidate], to_y[candidate], tips, partner_of[candidate]
+        if partner >= 0:
+            if bound[ligand_of[candidate]]:
+                continue
+            ex, ey, ez = place_of(ligand_of[candidate], centre[partner], turn[partner], molecules)
+        lateral = math.sqrt((x - ex) ** 2 + (y - ey) ** 2)
+        length = _birth_length(pair, lateral, z - ez, reach[kind], least[kind])
         if length == math.inf:
             continue
         crowd = 1.0 if pair else density_at(densities, cell, kind, x, y)
@@ -141,7 +151,7 @@ def _record(
     event.receptor = bonds.site[bond] - system.molecules.first[cell]
     event.partner = partner
     event.ligand = ligand if partner < 0 else ligand - system.molecules.first[partner]
-    event.anchor_x = bonds.anchor[bond, 0]
+    event.anchor_x = bonds.anchor[bond, 0]  # of a bond between cells: where it was when the bond formed
     event.anchor_y = bonds.anchor[bond, 1]
     event.length = length
     event.force = value(system.species.tables, table, TENSION, length)
@@ -152,7 +162,7 @@ def _record(
 def list_bridges(cell: int, bonds: Bonds) -> None:
     """List which of a cell's bonds are to other cells."""
     first, found = bonds.first[cell], 0
-    for bond in range(first, first + bonds.count[cell]):
+    for bond in range(first, first + bonds.number[cell]):
         if bonds.partner[bond] >= 0:
             bonds.bridge[first + found] = bond
             found += 1
@@ -165,7 +175,7 @@ def _drop(bond: int, cell: int, bonds: Bonds, bound: Flags) -> None:
     bound[bonds.site[bond]] = 0
     if bonds.partner[bond] >= 0:
         bound[bonds.ligand[bond]] = 0
-    last = bonds.first[cell] + bonds.count[cell] - 1
+    last = bonds.first[cell] + bonds.number[cell] - 1
     for b in range(bond, last):
         bonds.site[b] = bonds.site[b + 1]
         bonds.species[b] = bonds.species[b + 1]
@@ -174,7 +184,7 @@ def _drop(bond: int, cell: int, bonds: Bonds, bound: Flags) -> None:
         bonds.ligand[b] = bonds.ligand[b + 1]
         for a in range(3):
             bonds.anchor[b, a] = bonds.anchor[b + 1, a]
-    bonds.count[cell] -= 1
+    bonds.number[cell] -= 1
     if bonds.bridges[cell] > 0:
         list_bridges(cell, bonds)
 
@@ -189,24 +199,27 @@ def _bind(
     Where the wall's molecules are a density the anchor lies straight below the molecule, or, where bonds are never
     slack and the gap is smaller than the unstressed length, so far away at `angle` that the bond is unstressed.
     """
-    bond = bonds.first[cell] + bonds.count[cell]
+    bond = bonds.first[cell] + bonds.number[cell]
     site, kind = listed.site[candidate], listed.species[candidate]
     tips = system.bodies.wall_tips
     bonds.site[bond], bonds.species[bond], bonds.state[bond] = site, kind, 0
     bonds.partner[bond], bonds.ligand[bond] = listed.partner[candidate], listed.ligand[candidate]
     x, y, z = place_of(site, centre[cell], turn[cell], system.molecules)
-    if system.species.pairwise[kind]:
+    partner, height = listed.partner[candidate], tips
+    if partner >= 0:
+        x, y, height = place_of(listed.ligand[candidate], centre[partner], turn[partner], system.molecules)
+    elif system.species.pairwise[kind]:
         x, y = listed.x[candidate], listed.y[candidate]
     else:
         lateral = math.sqrt(max(system.species.least_length[kind] ** 2 - (z - tips) ** 2, 0.0))
         x, y = x + lateral * math.cos(angle), y + lateral * math.sin(angle)
-    bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2] = x, y, tips
-    bonds.count[cell] += 1
+    bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2] = x, y, height
+    bonds.number[cell] += 1
     bound[site] = 1
     if bonds.partner[bond] >= 0:
         bound[bonds.ligand[bond]] = 1
         list_bridges(cell, bonds)
-    return bond
+    return int(bond)
 
 
 @compiled_lean
@@ -236,8 +249,8 @@ def _born_state(kind: int, length: float, share: float, system: System) -> int:
     for table in range(first, last):
         short -= value(system.species.tables, table, ON_RATE, length)
         if short < 0:
-            return table - first
-    return last - first
+            return int(table - first)
+    return int(last - first)
 
 
 @compiled_lean
@@ -245,14 +258,18 @@ def happen(
     cell: int, which: int, excess: float, step: int, time: float, centre: Array, turn: Array, key: Word,
     system: System, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
 ) -> None:  # fmt: skip
-    """Let the event happen that `rates` stopped at, and record it; nothing where a molecule of the wall is bound already."""
-    count = bonds.count[cell]
+    """Let the event happen that `rates` stopped at, and record it; nothing if a molecule of the wall is bound already."""
+    count = bonds.number[cell]
     if which >= count:
         candidate = listed.first[cell] + which - count
         kind = listed.species[candidate]
-        if listed.ligand[candidate] >= 0 and _is_taken(kind, listed.ligand[candidate], bonds):
+        if (
+            listed.partner[candidate] < 0
+            and listed.ligand[candidate] >= 0
+            and _is_taken(kind, listed.ligand[candidate], bonds)
+        ):
             return
-        who = mixed(system.molecules.owner[cell], clocks.count[cell])
+        who = mixed(system.molecules.owner[cell], clocks.number[cell])
         bond = _bind(
             candidate, cell, 2 * math.pi * uniform(key, _ANCHORS, who, 0), centre, turn, system, bonds, bound, listed
         )
@@ -279,5 +296,5 @@ def slip_factors(cell: int, velocity: Array, gap: float, system: System, out: Ar
     slip_y = velocity[1] + lever * velocity[3]
     for kind in range(out.shape[0]):
         out[kind] = 1.0
-        if species.encounter[kind] >= 0:
+        if species.encounter[kind] >= 0 and species.partner_kind[kind] < 0:
             out[kind] = value(species.encounters, species.encounter[kind], 0, math.sqrt(slip_x**2 + slip_y**2))

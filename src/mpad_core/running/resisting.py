@@ -51,7 +51,7 @@ def solve_in_place(matrix: Array, right: Array) -> None:
 
 @compiled_lean
 def resistance(group: int, system: System, gaps: Array, functions: Array, matrix: Array, right: Array) -> None:
-    """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at gaps (N,) to the wall; `functions` (8,) is scratch."""
+    """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at gaps (N,); `functions` (8,) is scratch."""
     bodies, groups = system.bodies, system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
     m, offset, coupling = 6 * n, groups.coupling_first[group], groups.coupling

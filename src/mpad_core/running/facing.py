@@ -1,0 +1,157 @@
+"""Which molecules of two cells may bind to each other: lists like those for the wall, see `listing`; compiled.
+
+Two lists a pair: of each cell's molecules those that face the other cell, and of those the candidates. Each stands
+until the cells may have brought molecules nearer to each other by more than it allows for: by their relative
+displacement, and by both turns times the radii on which their molecules lie.
+"""
+
+import math
+
+from mpad_core.arrays import Array
+from mpad_core.numerics.compiled import compiled_inline, compiled_lean
+from mpad_core.running.layout import Candidates, System
+from mpad_core.running.places import distance, place_of
+
+NEAR_MARGIN = 0.3  # µm: molecules this far out of reach face each other
+MARGIN = 0.02  # µm: and these are candidates
+NEAR, FIRST = 1, 0  # levels of the two lists
+
+
+@compiled_inline
+def shell_of(cell: int, system: System) -> float:
+    """Give the radius on which a cell's molecules lie."""
+    return float(system.bodies.radius[cell] + system.bodies.roughness[cell])
+
+
+@compiled_inline
+def append(cell: int, site: int, kind: int, ligand: int, partner: int, x: float, y: float, listed: Candidates) -> bool:
+    """Add a candidate; tell whether there was room."""
+    at = listed.first[cell] + listed.number[cell]
+    room = bool(at < listed.first[cell + 1])
+    if room:
+        listed.site[at] = site
+        listed.species[at] = kind
+        listed.ligand[at] = ligand
+        listed.partner[at] = partner
+        listed.x[at] = x
+        listed.y[at] = y
+        listed.number[cell] += 1
+    return room
+
+
+@compiled_lean
+def _reach(system: System) -> float:
+    """Give the distance below which molecules of two cells can bind."""
+    reach = 0.0
+    for kind in range(system.species.reach.shape[0]):
+        if system.species.partner_kind[kind] >= 0:
+            reach = max(reach, system.species.reach[kind])
+    return reach
+
+
+@compiled_lean
+def nearer(
+    pair: int, level: int, cell: int, centre: Array, rotation: Array, system: System, listed: Candidates
+) -> float:
+    """Give how much nearer to each other molecules of a pair may have come since they were listed."""
+    partner = system.neighbours.partner[pair]
+    noted = listed.pair_from
+    way = turn = partner_turn = 0.0
+    for a in range(3):
+        way += (centre[cell, a] - centre[partner, a] - noted[pair, level, a]) ** 2
+        turn += (rotation[cell, a] - noted[pair, level, 3 + a]) ** 2
+        partner_turn += (rotation[partner, a] - noted[pair, level, 6 + a]) ** 2
+    turns = shell_of(cell, system) * math.sqrt(turn) + shell_of(partner, system) * math.sqrt(partner_turn)
+    return math.sqrt(way) + turns
+
+
+@compiled_lean
+def _note(
+    pair: int, level: int, slack: float, cell: int, centre: Array, rotation: Array, system: System, listed: Candidates
+) -> None:
+    partner = system.neighbours.partner[pair]
+    listed.pair_slack[pair, level] = slack
+    for a in range(3):
+        listed.pair_from[pair, level, a] = centre[cell, a] - centre[partner, a]
+        listed.pair_from[pair, level, 3 + a] = rotation[cell, a]
+        listed.pair_from[pair, level, 6 + a] = rotation[partner, a]
+
+
+@compiled_lean
+def _apart(cell: int, partner: int, centre: Array, system: System) -> float:
+    """Give the gap between the shells on which two cells' molecules lie."""
+    a, b = centre[cell], centre[partner]
+    return distance(a[0], a[1], a[2], b[0], b[1], b[2]) - shell_of(cell, system) - shell_of(partner, system)
+
+
+@compiled_lean
+def list_facing(
+    pair: int, cell: int, centre: Array, rotation: Array, turn: Array, system: System, listed: Candidates
+) -> None:
+    """List the molecules of a pair that are within reach of the other's shell, or `NEAR_MARGIN` more."""
+    partner = system.neighbours.partner[pair]
+    reach = _reach(system)
+    apart = _apart(cell, partner, centre, system)
+    _note(pair, NEAR, max(NEAR_MARGIN, apart - reach) - MARGIN, cell, centre, rotation, system, listed)
+    for side in range(2):
+        own, other = (cell, partner) if side == 0 else (partner, cell)
+        slot = 2 * pair + side
+        at = listed.facing_first[slot]
+        farthest = shell_of(other, system) + reach + NEAR_MARGIN
+        cx, cy, cz = centre[other, 0], centre[other, 1], centre[other, 2]
+        if apart < reach + NEAR_MARGIN:
+            for site in range(system.molecules.first[own], system.molecules.first[own + 1]):
+                x, y, z = place_of(site, centre[own], turn[own], system.molecules)
+                if (x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2 < farthest * farthest:
+                    listed.facing[at] = site
+                    at += 1
+        listed.facing_number[slot] = at - listed.facing_first[slot]
+
+
+@compiled_lean
+def _add_partners(
+    pair: int, cell: int, site: int, kind: int, wanted: int, centre: Array, turn: Array, system: System,
+    listed: Candidates,
+) -> bool:  # fmt: skip
+    """Add the partner's molecules of a kind that one of a cell's could bind to; tell whether there was room."""
+    partner = system.neighbours.partner[pair]
+    molecules, reach = system.molecules, system.species.reach[kind] + MARGIN
+    x, y, z = place_of(site, centre[cell], turn[cell], molecules)
+    first = listed.facing_first[2 * pair + 1]
+    for k in range(first, first + listed.facing_number[2 * pair + 1]):
+        other = listed.facing[k]
+        px, py, pz = place_of(other, centre[partner], turn[partner], molecules)
+        near = (x - px) ** 2 + (y - py) ** 2 + (z - pz) ** 2 < reach * reach
+        if near and molecules.kind[other] == wanted and not append(cell, site, kind, other, partner, 0.0, 0.0, listed):
+            return False
+    return True
+
+
+@compiled_lean
+def add_facing(
+    pair: int, cell: int, centre: Array, rotation: Array, turn: Array, system: System, listed: Candidates
+) -> bool:
+    """Add to a cell's candidates what its molecules can bind to on a partner; tell whether there was room."""
+    partner, species, molecules = system.neighbours.partner[pair], system.species, system.molecules
+    apart, reach = _apart(cell, partner, centre, system), _reach(system)
+    _note(pair, FIRST, max(MARGIN, apart - reach), cell, centre, rotation, system, listed)
+    farthest = shell_of(partner, system) + reach + MARGIN
+    cx, cy, cz = centre[partner, 0], centre[partner, 1], centre[partner, 2]
+    first = listed.facing_first[2 * pair]
+    for k in range(first, first + listed.facing_number[2 * pair]):
+        site = listed.facing[k]
+        x, y, z = place_of(site, centre[cell], turn[cell], molecules)
+        if (x - cx) ** 2 + (y - cy) ** 2 + (z - cz) ** 2 >= farthest * farthest:
+            continue
+        for kind in range(species.site_kind.shape[0]):
+            mine, theirs, own = species.site_kind[kind], species.partner_kind[kind], molecules.kind[site]
+            if theirs < 0:
+                continue
+            room = True
+            if own == mine:
+                room = _add_partners(pair, cell, site, kind, theirs, centre, turn, system, listed)
+            if room and own == theirs and mine != theirs:
+                room = _add_partners(pair, cell, site, kind, mine, centre, turn, system, listed)
+            if not room:
+                return False
+    return True
