@@ -20,7 +20,8 @@ def with_captures(problem: Problem, state: State) -> State:
     caught = np.where(bound, state.caught_since, np.inf)
     for i, time in _unbroken_since(state).items():
         since[i], at[i], caught[i] = time, _place(state, i, time), np.inf
-    for i in np.flatnonzero(bound & (state.time - since >= problem.caught.bound_for)):
+    for k in np.flatnonzero(bound & (state.time - since >= problem.caught.bound_for)):
+        i = int(k)
         speed = abs(state.centres[i, 0] - at[i]) / max(state.time - since[i], 1e-300)
         place = float(problem.radii[i]), float(state.centres[i, 2]), float(state.wall_gaps[i])
         if speed < problem.caught.slower_than * lone_velocity(problem.setting, *place):

@@ -258,7 +258,7 @@ def happen(
     cell: int, which: int, excess: float, step: int, time: float, centre: Array, turn: Array, key: Word,
     system: System, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
 ) -> None:  # fmt: skip
-    """Let the event happen that `rates` stopped at, and record it; nothing if a molecule of the wall is bound already."""
+    """Let the event happen that `rates` stopped at, and record it; nothing if the wall's molecule is bound already."""
     count = bonds.number[cell]
     if which >= count:
         candidate = listed.first[cell] + which - count
