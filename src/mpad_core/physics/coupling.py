@@ -68,9 +68,10 @@ def lone_velocity(setting: Setting, radius: float, height: float, gap: float) ->
 
 
 def free_motion(
-    solver: MobilitySolver, plan: Any, setting: Setting, configuration: Configuration, speed: float
-) -> tuple[Array, Array]:
-    """Ask a solver for mobility (6n, 6n), symmetrised, and free velocities (6n,), in one block of solves.
+    solver: MobilitySolver, plan: Any, setting: Setting, configuration: Configuration, speed: float,
+    guess: Array | None = None,
+) -> tuple[Array, Array, Array | None]:  # fmt: skip
+    """Ask a solver for mobility (6n, 6n), symmetrised, and free velocities (6n,), in one block of solves; and a guess.
 
     Loads are such as give velocities of about `speed` (µm/s), so that taking the free velocities away again loses no
     digits.
@@ -79,13 +80,13 @@ def free_motion(
     size = np.tile(unit_load(setting.viscosity, float(configuration.radii.max()), speed), n)
     loads = np.zeros((6 * n, 6 * n + 1))
     loads[:, :-1] = np.diag(size)
-    motion = asking.solve(solver, asking.prepare(solver, plan, configuration), loads.reshape(n, 6, 6 * n + 1))
+    motion = asking.solve(solver, asking.prepare(solver, plan, configuration, guess), loads.reshape(n, 6, 6 * n + 1))
     answer = motion.velocity.reshape(6 * n, 6 * n + 1)
     mobility = (answer[:, :-1] - answer[:, -1:]) / size
     size_of = np.sqrt(np.abs(np.diag(mobility)))
     if (np.abs(mobility - mobility.T) > _ASYMMETRY * np.outer(size_of, size_of)).any():
         raise PartError(f"solver {solver.name!r} gave a mobility that is not symmetric, as reciprocity demands")
-    return 0.5 * (mobility + mobility.T), answer[:, -1].copy()
+    return 0.5 * (mobility + mobility.T), answer[:, -1].copy(), motion.guess
 
 
 @frozen(kw_only=True, eq=False)
@@ -154,9 +155,11 @@ class SolverCoupling:
         groups = group_cells(configuration, problem.held, self.touching)
         loads = np.zeros((len(problem.radii), 6))
         matrices = []
+        few = len(problem.radii) - len(held) <= LARGEST_GROUP  # then the guess is of the one group's block
         for group in groups:
             members = np.concatenate([group, held])
-            resistance, free = self._resistance(configuration.part(members), members)
+            resistance, free, found = self._resistance(configuration.part(members), members, guess if few else None)
+            guess = found if few else guess
             own = 6 * len(group)
             for place, cell in enumerate(group):
                 lone, ambient = self._lone(configuration, cell)
@@ -173,15 +176,19 @@ class SolverCoupling:
         gap = float(configuration.wall_gaps[cell])
         return lone_cell(self.problem.setting, float(configuration.radii[cell]), height, gap)
 
-    def _resistance(self, configuration: Configuration, members: Indices) -> tuple[Array, Array]:
-        mobility, free = free_motion(self.problem.solver, self.plan, self.problem.setting, configuration, self.speed)
+    def _resistance(
+        self, configuration: Configuration, members: Indices, guess: Array | None
+    ) -> tuple[Array, Array, Array | None]:
+        solver, setting = self.problem.solver, self.problem.setting
+        mobility, free, found = free_motion(solver, self.plan, setting, configuration, self.speed, guess)
         try:
             resistance = cho_solve(cho_factor(mobility), np.eye(len(mobility)))
         except (np.linalg.LinAlgError, ValueError) as error:
             names = ", ".join(self.problem.names[i] for i in members)
-            solver = self.problem.solver.name
-            raise RefusedError(f"solver {solver!r}: mobility of {names} is not positive definite ({error})") from error
-        return 0.5 * (resistance + resistance.T), free
+            raise RefusedError(
+                f"solver {solver.name!r}: mobility of {names} is not positive definite ({error})"
+            ) from error
+        return 0.5 * (resistance + resistance.T), free, found
 
     def _add_outside(
         self, configuration: Configuration, groups: tuple[Indices, ...], matrices: list[Array], loads: Array,

@@ -100,7 +100,7 @@ def step(machine: Machine, state: State, until: float) -> State:
     """Take one outer step."""
     problem = machine.problem
     moves = pace.pair_moves(problem, _coupled_pairs(machine, state), state.centres, machine.pace.share)
-    stride = pace.stride_of(machine.pace, moves, state.drift, until - state.time)
+    stride = pace.stride_of(problem, machine.pace, moves, state.drift, until - state.time)
     middle = _ahead(problem, state, 0.5 * stride.sub_steps * stride.grains * machine.pace.grain)
     coupling = machine.drift.added(machine.coupler.at(middle, state.mean_loads, state.guess), middle, state.step)
     bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, stride)

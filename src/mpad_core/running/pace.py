@@ -19,7 +19,8 @@ _GAP_CHANGE = 0.2  # of a cell's gap to the wall over which the frozen coupling 
 _LARGEST_SUB_STEP = 1e-3  # s, where nothing else bounds it
 _SHEARED = 0.05  # of 1/shear rate: the longest sub-step for a position error of 0.1 nm
 _USUAL = 1e-4  # µm, that error
-_BURST = 40  # longest sub-steps in the longest burst
+_BURST = 200  # longest sub-steps in the longest burst
+_FARTHEST = 1.0  # radius of a cell, that it may go in a burst: what listens to a run hears of it as often
 _FARTHER = 1.5  # than they may: at which a burst ends before its time
 _DIGITS = 3  # of the longest sub-step, in grains
 _RANGE_SHARE = 0.2  # of the repulsion's range that thermal motion may cross in a sub-step
@@ -136,12 +137,13 @@ class Stride:
     sub_steps: int
 
 
-def stride_of(pace: Pace, moves: PairMoves, drift: Array, left: float) -> Stride:
+def stride_of(problem: Problem, pace: Pace, moves: PairMoves, drift: Array, left: float) -> Stride:
     """Choose the length of the next burst: until the cells, if they go on as before, have moved as far as they may.
 
     `left` (s) is the time to the run's end, to be met within a grain.
     """
-    time = pace.longest
+    speed = np.abs(drift[:, :3]).max(axis=1)
+    time = min(pace.longest, float((_FARTHEST * problem.radii / np.maximum(speed, 1e-300)).min()))
     if len(moves.pairs):
         speeds = np.linalg.norm(drift[moves.pairs[:, 0], :3] - drift[moves.pairs[:, 1], :3], axis=1)
         time = min(time, float((moves.allowed / np.maximum(speeds, 1e-300)).min()))
