@@ -26,7 +26,7 @@ NOT_FELT = 1e12  # radii: the wall functions are those of an unbounded fluid to 
 _ROOM_TO_MOVE = 1.25  # of the reach of contact
 _BOND_REACH = 30.0  # unstressed lengths: as far as tables of bonds go at most
 _ASYMMETRY = 0.1  # of sqrt(M_ii M_jj): coarse boundary elements reach 0.03 (near contact), and are symmetrised
-_REACHES = (8.0, 4.0, 2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group
+_REACHES = (2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group, where they are many
 
 
 @frozen(kw_only=True, eq=False)
@@ -158,6 +158,9 @@ class SolverCoupling:
         few = len(problem.radii) - len(held) <= LARGEST_GROUP  # then the guess is of the one group's block
         for group in groups:
             members = np.concatenate([group, held])
+            if len(members) == 1 and len(groups) > 1:  # alone it is as the wall functions have it; g holds the others
+                matrices.append(np.zeros((6, 6)))
+                continue
             resistance, free, found = self._resistance(configuration.part(members), members, guess if few else None)
             guess = found if few else guess
             own = 6 * len(group)

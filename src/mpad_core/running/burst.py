@@ -13,7 +13,7 @@ from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled, compiled_lean
 from mpad_core.running.clocks import EARLY, LATE, choice, drawn, share_until, used_until
 from mpad_core.running.densities import holds
-from mpad_core.running.layout import Course, Work
+from mpad_core.running.layout import Course, System, Work
 from mpad_core.running.listing import reaches_out, refresh
 from mpad_core.running.moving import advance, commit, refresh_turns, step_explicitly
 from mpad_core.running.reacting import happen, rates, slip_factors
@@ -25,20 +25,38 @@ _STEEP = 3.0  # ratio of a sub-step's two rates beyond which two points are too 
 _UNCERTAIN = 0.02  # of the hazard used up between two rates so different: by how much it may be wrong
 _HELD_STEPS = 5  # explicit steps over which rates are taken as constant
 _GROWTH = 4.0  # from one part of a sub-step to the next
+_RELAXING = TICKS // 1024  # the part after an event that changes the loads: stiff bonds share them anew at once
 
 
 @compiled
-def _work_for(group: int, course: Course) -> Work:
-    """Make room for the sub-steps of a group; cells that are held are where they are."""
-    system, motion, turn = course.system, course.motion, course.turn
-    cells = system.bodies.radius.shape[0]
+def _works(course: Course) -> list[Work]:
+    """Make room for the sub-steps of every group; what is laid out by cells they share, and held cells stay in it."""
+    motion, turn, cells = course.motion, course.turn, course.turn.shape[0]
+    gaps, centre, orientation, rotation = (
+        np.empty(cells),
+        motion.centre.copy(),
+        motion.orientation.copy(),
+        motion.turn.copy(),
+    )
+    turned, middle, middle_turn = turn.copy(), motion.centre.copy(), turn.copy()
+    return [
+        _work_for(group, course.system, gaps, centre, orientation, rotation, turned, middle, middle_turn)
+        for group in range(course.system.groups.first.shape[0] - 1)
+    ]
+
+
+@compiled
+def _work_for(
+    group: int, system: System, gaps: Array, centre: Array, orientation: Array, rotation: Array, turned: Array,
+    middle: Array, middle_turn: Array,
+) -> Work:  # fmt: skip
     members = system.groups.cells[system.groups.first[group] : system.groups.first[group + 1]]
     m = 6 * members.shape[0]
     return Work(
         system.bodies.radius[members], np.empty((m, m)), np.empty((m, m)), np.empty(m), np.empty(m), np.empty(m),
         np.empty(m), np.empty(m), np.empty(m), np.zeros(m), np.empty(8), np.empty(system.species.site_kind.shape[0]),
-        np.empty(m), np.empty(m), np.empty((2, 3, 6)), np.empty((3, 3)), np.empty(cells), motion.centre.copy(),
-        motion.orientation.copy(), motion.turn.copy(), turn.copy(), motion.centre.copy(), turn.copy(),
+        np.empty(m), np.empty(m), np.empty((2, 3, 6)), np.empty((3, 3)), gaps, centre, orientation, rotation, turned, middle,
+        middle_turn,
     )  # fmt: skip
 
 
@@ -110,8 +128,8 @@ def _use_up(group: int, share: float, dt: float, whose: int, course: Course) -> 
 
 
 @compiled_lean
-def _let_happen(cell: int, share: float, velocity: Array, factor: Array, course: Course) -> None:
-    """Draw what a cell's clock has run out for, from the rates of the moment, and let it happen.
+def _let_happen(cell: int, share: float, velocity: Array, factor: Array, course: Course) -> bool:
+    """Draw what a cell's clock has run out for, from the rates of the moment, let it happen, and tell if loads changed.
 
     `share` is that of the sub-step. The clock has been wound already: the draw belongs to the number before.
     """
@@ -121,12 +139,14 @@ def _let_happen(cell: int, share: float, velocity: Array, factor: Array, course:
     total, _, _ = rates(cell, math.inf, centre, turn, system, bonds, bound, listed, factor)
     drawn_share = choice(key, system.molecules.owner[cell], course.clocks.number[cell] - 1)
     _, which, excess = rates(cell, drawn_share * total, centre, turn, system, bonds, bound, listed, factor)
+    recorded = course.progress.events[0]
     if which >= 0:
         step = course.dice.step + course.progress.beats[0] * course.dice.stride
         happen(
             cell, which, excess, step, share, centre, turn, key, system, bonds, bound, listed, course.clocks,
             course.progress, course.events,
         )  # fmt: skip
+    return course.progress.events[0] > recorded and course.events[recorded].force != 0.0
 
 
 @compiled_lean
@@ -224,12 +244,13 @@ def _move_group(group: int, course: Course, work: Work) -> int:
             continue
         _use_up(group, share, dt, whose, course)
         commit(group, limits.sub_step * done / TICKS, system, course.motion, course.turn, work)
+        progress.part[group] = min(int(part * _longer(error, course)) + 1, TICKS)
         if whose >= 0:
             place = 6 * system.groups.place[whose]
             own = work.velocity[place : place + 6]
-            _let_happen(whose, (tick + share * part) / TICKS, own, work.factor, course)
+            pulled = _let_happen(whose, (tick + share * part) / TICKS, own, work.factor, course)
+            progress.part[group] = _RELAXING if pulled else progress.part[group]
         progress.tick[group] = tick + done
-        progress.part[group] = min(int(part * _longer(error, course)) + 1, TICKS)
     return REACHED
 
 
@@ -380,7 +401,7 @@ def burst(course: Course) -> tuple[int, int]:
     refresh_turns(course.motion, course.turn)
     course.listed.near_number[:] = -1
     course.listed.facing_number[:] = -1
-    works = [_work_for(group, course) for group in range(course.system.groups.first.shape[0] - 1)]
+    works = _works(course)
     at_rest, factor = np.zeros(6), np.empty(course.system.species.site_kind.shape[0])
     while progress.beats[0] < limits.most:
         outcome, group = _sub_step(course, works, at_rest, factor)
