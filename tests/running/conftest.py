@@ -83,6 +83,12 @@ class Lab:
         machine = make_ready(problem)
         return evolve(machine, pace=evolve(machine.pace, **pace))
 
+    def many(self, problem: Problem, number: int) -> Problem:
+        """Give a problem of one cell so many times, 30 µm apart; every cell has draws of its own."""
+        copies = problem.only([0] * number)
+        apart = np.outer(np.arange(number), [0.0, 30.0, 0.0])
+        return evolve(copies, names=tuple(f"c{i}" for i in range(number)), start=copies.start + apart)
+
     def start(self, machine: Machine) -> State:
         return initial_state(machine)
 

@@ -115,8 +115,8 @@ def test_bond_counts_of_a_frame_follow_the_events(lab: Any) -> None:
         past = events[events["time"] <= frame.time]
         assert frame.bond_counts[0] == (past["kind"] == 0).sum() - (past["kind"] == 1).sum()
     felt = hazards(machine.problem)
-    for before, after in pairwise(marched):
-        frame = frame_of(machine.problem, felt, before, after, 1.0)
+    for after in marched[1:]:
+        frame = frame_of(machine.problem, felt, after)
         assert frame.bond_counts[0] == len(after.bonds)
         assert (frame.centres == after.centres).all()
         assert frame.overlaps == pytest.approx(after.centres[:, 2] - 5.255)
@@ -125,7 +125,7 @@ def test_bond_counts_of_a_frame_follow_the_events(lab: Any) -> None:
 def test_frames_without_wall_or_bonds_say_so(lab: Any) -> None:
     machine = lab.machine(FREE, shear=80.0, wall=False)
     state = lab.start(machine)
-    frame = frame_of(machine.problem, hazards(machine.problem), state, state, 1.0)
+    frame = frame_of(machine.problem, hazards(machine.problem), state)
     assert np.isinf(frame.wall_gaps).all()
     assert np.isnan(frame.overlaps).all()
     assert (frame.capture_hazards == 0).all()

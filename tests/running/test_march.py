@@ -314,7 +314,7 @@ def test_a_cell_that_first_rolls_alone_comes_back_with_its_bonds(lab: Any) -> No
 def test_a_solver_whose_answer_no_step_can_balance_is_named(lab: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     machine = lab.machine({"a": 'height = "6 um"'}, shear=80.0, solver="rpb")
     state = lab.start(machine)
-    monkeypatch.setattr(marching, "burst", lambda *_: (marching.NO_BALANCE, 0, 0))
+    monkeypatch.setattr(marching, "burst", lambda *_: (marching.NO_BALANCE, 0))
     with pytest.raises(RefusedError, match=r"step 0, t = 0 s: no sub-step.*a \(gap to the wall 1 um\).*rpb"):
         lab.last(machine, 0.01, state)
 

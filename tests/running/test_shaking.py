@@ -14,9 +14,9 @@ from mpad_core.physics import fluctuations
 from mpad_core.physics.coupling import NoDrift
 from mpad_core.physics.state import from_arrays, to_arrays
 from mpad_core.running import assembly
-from mpad_core.running.layout import Attached
+from mpad_core.running.burst import _work_for
 from mpad_core.running.march import configuration_of
-from mpad_core.running.moving import DONE, advance
+from mpad_core.running.moving import advance
 from mpad_core.running.shaking import TICKS, draw, path
 
 KT = 0.00411433402  # pN µm, at 298 K
@@ -51,12 +51,11 @@ class Shaken:
         self.system = assembly.system(machine.problem, machine.fixed, state, coupling, -np.inf)
 
     def displacement(self, noise: Any, dt: float) -> Any:
-        cells = len(self.state.wall_gaps)
-        motion = assembly.motion_of(self.state)
-        attached = Attached(np.zeros(cells + 1, np.int64), np.zeros(4, np.int64), np.empty((4, 3)))
-        bonds = assembly.bond_room(self.state.bonds, 4)
-        assert advance(0, dt, self.system, bonds, attached, motion, np.ascontiguousarray(noise)) == DONE
-        moved = np.hstack([motion.centre - self.state.centres, motion.turn])
+        motion, work = assembly.motion_of(self.state), _work_for(0, self.system)
+        bonds = assembly.room_for(self.machine.fixed, self.state.bonds, len(self.state.wall_gaps)).bonds
+        work.noise[:] = noise
+        assert advance(0, dt, self.system, bonds, motion, work) < np.inf
+        moved = np.hstack([work.centre - self.state.centres, work.rotation])
         return moved[~self.machine.problem.held].ravel()
 
     def moments(self, dt: float) -> Any:
