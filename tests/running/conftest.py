@@ -84,10 +84,12 @@ class Lab:
         return evolve(machine, pace=evolve(machine.pace, **pace))
 
     def many(self, problem: Problem, number: int) -> Problem:
-        """Give a problem of one cell so many times, 30 µm apart; every cell has draws of its own."""
+        """Give a problem of one cell so many times, 30 µm apart, without molecules; each has draws of its own."""
         copies = problem.only([0] * number)
         apart = np.outer(np.arange(number), [0.0, 30.0, 0.0])
-        return evolve(copies, names=tuple(f"c{i}" for i in range(number)), start=copies.start + apart)
+        names = tuple(f"c{i}" for i in range(number))
+        none = 0.0 * copies.site_densities  # they are to be put in by hand, and to place 28 000 a cell takes long
+        return evolve(copies, names=names, start=copies.start + apart, site_densities=none)
 
     def start(self, machine: Machine) -> State:
         return initial_state(machine)
