@@ -331,6 +331,7 @@ def test_pairs_are_in_balance_one_by_one(lab: Any, compression: str) -> None:
 
 
 @pytest.mark.parametrize("sub_step", [1e-4, 1e-3])
+@pytest.mark.long
 def test_two_bonds_at_different_levers(lab: Any, sub_step: float) -> None:
     """A force through the centre, one bond 0.2 µm before and one 0.4 µm behind: two thirds and one third of it.
 
