@@ -32,13 +32,8 @@ _RELAXING = TICKS // 1024  # the part after an event that changes the loads: sti
 def _works(course: Course) -> list[Work]:
     """Make room for the sub-steps of every group; what is laid out by cells they share, and held cells stay in it."""
     motion, turn, cells = course.motion, course.turn, course.turn.shape[0]
-    gaps, centre, orientation, rotation = (
-        np.empty(cells),
-        motion.centre.copy(),
-        motion.orientation.copy(),
-        motion.turn.copy(),
-    )
-    turned, middle, middle_turn = turn.copy(), motion.centre.copy(), turn.copy()
+    gaps, centre, orientation = np.empty(cells), motion.centre.copy(), motion.orientation.copy()
+    rotation, turned, middle, middle_turn = motion.turn.copy(), turn.copy(), motion.centre.copy(), turn.copy()
     return [
         _work_for(group, course.system, gaps, centre, orientation, rotation, turned, middle, middle_turn)
         for group in range(course.system.groups.first.shape[0] - 1)
@@ -55,8 +50,8 @@ def _work_for(
     return Work(
         system.bodies.radius[members], np.empty((m, m)), np.empty((m, m)), np.empty(m), np.empty(m), np.empty(m),
         np.empty(m), np.empty(m), np.empty(m), np.zeros(m), np.empty(8), np.empty(system.species.site_kind.shape[0]),
-        np.empty(m), np.empty(m), np.empty((2, 3, 6)), np.empty((3, 3)), gaps, centre, orientation, rotation, turned, middle,
-        middle_turn,
+        np.empty(m), np.empty(m), np.empty((2, 3, 6)), np.empty((3, 3)), gaps, centre, orientation,
+        rotation, turned, middle, middle_turn,
     )  # fmt: skip
 
 
@@ -146,7 +141,7 @@ def _let_happen(cell: int, share: float, velocity: Array, factor: Array, course:
             cell, which, excess, step, share, centre, turn, key, system, bonds, bound, listed, course.clocks,
             course.progress, course.events,
         )  # fmt: skip
-    return course.progress.events[0] > recorded and course.events[recorded].force != 0.0
+    return bool(course.progress.events[0] > recorded and course.events[recorded].force != 0.0)
 
 
 @compiled_lean

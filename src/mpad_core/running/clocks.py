@@ -4,7 +4,7 @@ A cell's next event happens when the hazard of all that can happen to it, integr
 number that is exponential with mean one (Anderson, J. Chem. Phys. 127 (2007) 214107). Over a sub-step the rate is
 looked up at the two points of Gauss and Legendre, and taken as the exponential through both, k exp(g s): exact for a
 bond of Bell's whose load grows evenly, and to fourth order for any smooth rate, since the error of its logarithm,
-proportional to (s − s₁)(s − s₂), has no mean. So nothing depends on how time is cut into sub-steps but through the path.
+proportional to (s − s₁)(s − s₂), has no mean. So nothing depends on how time is cut into sub-steps but by the path.
 """
 
 import math
@@ -31,7 +31,7 @@ def choice(key: Word, owner: Word, count: int) -> float:
 
 @compiled_lean
 def _growth(early: float, late: float) -> float:
-    """Give g of the rate k exp(g s) that goes through both, s the share; 0 where one of them is zero: see `used_until`."""
+    """Give g of the rate k exp(g s) through both, s the share; 0 where one of them is zero: see `used_until`."""
     return math.log(late / early) / (LATE - EARLY) if early > 0.0 and late > 0.0 else 0.0
 
 
