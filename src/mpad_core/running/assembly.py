@@ -179,8 +179,8 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
     )
     first = np.searchsorted(np.sort(owner), np.arange(len(sizes) + 1))
     contacts = Contacts(fixed.contact_law, fixed.contact_reach, np.ascontiguousarray(pairs), first)
-    bridging = (fixed.species.partner_kind >= 0).any()
-    neighbours = neighbours_of(problem, pairs if bridging else np.zeros((0, 2), np.int64))
+    bridging = (fixed.species.partner_kind >= 0).any() & (np.diff(fixed.molecules.first) > 0)[pairs].all(axis=1)
+    neighbours = neighbours_of(problem, pairs[bridging])
     return System(
         fixed.bodies, fixed.molecules, fixed.species, contacts, neighbours, groups, fixed.thermal, around
     )  # fmt: skip
