@@ -10,8 +10,8 @@ push a cell through the wall; a frozen load cannot.
 from typing import Any, Protocol
 
 import numpy as np
-from attrs import frozen
-from scipy.linalg import cho_factor, cho_solve
+from attrs import evolve, frozen
+from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import PartError, RefusedError
@@ -102,6 +102,20 @@ class NoCoupling:
         groups = linked(configuration, np.flatnonzero(~self.problem.held), self.touching)
         matrices = tuple(np.zeros((6 * len(group), 6 * len(group))) for group in groups)
         return Coupling(groups=groups, matrices=matrices, loads=np.zeros((len(self.problem.radii), 6)))
+
+
+def joined(coupling: Coupling, pairs: Indices) -> Coupling:
+    """Put the groups of cells that pairs (P, 2) link into one; what couples them through the fluid stays as it is.
+
+    However far a bond has been drawn out, its load must be solved for on both cells together.
+    """
+    groups, matrices = list(coupling.groups), list(coupling.matrices)
+    for pair in pairs:
+        of = [k for k, group in enumerate(groups) if np.isin(pair, group).any()]
+        if len(of) == 2:
+            groups[of[0]] = np.concatenate([groups[of[0]], groups.pop(of[1])])
+            matrices[of[0]] = block_diag(matrices[of[0]], matrices.pop(of[1]))
+    return evolve(coupling, groups=tuple(groups), matrices=tuple(matrices))
 
 
 def linked(configuration: Configuration, cells: Indices, within: float) -> tuple[Indices, ...]:

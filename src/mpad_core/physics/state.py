@@ -27,6 +27,12 @@ class BondList:
         """Give the number of living bonds."""
         return len(self.cell)
 
+    def pairs(self) -> Indices:
+        """Give the pairs of cells (P, 2) that are bound to each other."""
+        bridging = self.partner >= 0
+        pairs: Indices = np.unique(np.stack([self.cell[bridging], self.partner[bridging]], axis=1), axis=0)
+        return pairs
+
 
 def no_bonds() -> BondList:
     """Give the empty list."""

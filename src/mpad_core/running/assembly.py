@@ -166,6 +166,9 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
         place[group] = np.arange(len(group))
         of_group[group] = g
     pairs = near_pairs(problem, state.centres, reach)
+    # cells that will not meet before the burst is over may have been put into different groups
+    of = of_group[pairs]
+    pairs = pairs[(of[:, 0] == of[:, 1]) | (of == len(coupling.groups)).any(axis=1)]
     owner = of_group[pairs].min(axis=1) if len(pairs) else np.zeros(0, np.int64)
     pairs = pairs[np.argsort(owner, kind="stable")]
     sizes = [len(group) for group in coupling.groups]

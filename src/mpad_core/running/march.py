@@ -15,7 +15,7 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.tables import value
-from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, coupler, drift_of
+from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, contact_reach, coupler, drift_of, joined
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, Way
 from mpad_core.physics.wall_density import Rasters, rasters
@@ -104,13 +104,13 @@ def step(machine: Machine, state: State, until: float) -> State:
     middle = _ahead(problem, state, 0.5 * stride.sub_steps * stride.grains * machine.pace.grain)
     coupling = machine.drift.added(machine.coupler.at(middle, state.mean_loads, state.guess), middle, state.step)
     bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, stride)
-    return _burst(machine, state, coupling, bounds, stride.grains)
+    return _burst(machine, state, joined(coupling, state.bonds.pairs()), bounds, stride.grains)
 
 
 def _coupled_pairs(machine: Machine, state: State) -> Any:
     """List the pairs whose relative motion bounds a burst: all that are coupled, or could touch."""
     problem = machine.problem
-    bounding = problem.coupled or problem.contact is not None
+    bounding = problem.coupled or contact_reach(problem) > 0
     return assembly.near_pairs(problem, state.centres, np.inf if bounding else -np.inf)
 
 
