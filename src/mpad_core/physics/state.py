@@ -146,6 +146,8 @@ def _check(state: State, cells: int, sites: int) -> None:
             raise ValueError(f"bonds' {name} is {found.dtype} of shape {found.shape}")
     if bonds.anchor.shape != (count, 3) or (count and (bonds.cell.max() >= cells or bonds.site.max() >= sites)):
         raise ValueError("bonds hold cells or sites that are not there")
+    if (bonds.partner >= cells).any() or (bonds.ligand[bonds.partner >= 0] >= sites).any():
+        raise ValueError("bonds between cells hold cells or sites that are not there")
     if (np.diff(bonds.cell) < 0).any():
         raise ValueError("bonds are not in the order of their cells")
 
