@@ -261,24 +261,17 @@ def _move_explicitly(group: int, course: Course, work: Work) -> int:
     steps = max(round(course.limits.sub_step / course.limits.euler[0]), 1)
     dt = course.limits.sub_step / steps
     while progress.tick[group] < TICKS:
+        if not _all_ready(group, course):
+            return ROOM_NEEDED
         done = progress.part[group] % TICKS  # steps of this sub-step
         for k in range(first, last):
             cell = groups.cells[k]
             if done % _HELD_STEPS == 0 or ahead[cell, 1] < 0:
-                if not _is_ready(cell, course):
-                    return ROOM_NEEDED
                 slip_factors(cell, motion.velocity[cell], motion.gap[cell], system, work.factor)
                 ahead[cell, 0], _, _ = rates(
-                    cell,
-                    math.inf,
-                    motion.centre,
-                    course.turn,
-                    system,
-                    course.bonds,
-                    course.bound,
-                    course.listed,
+                    cell, math.inf, motion.centre, course.turn, system, course.bonds, course.bound, course.listed,
                     work.factor,
-                )
+                )  # fmt: skip
                 ahead[cell, 1] = 0.0
             clocks.left[cell] -= ahead[cell, 0] * dt
         step_explicitly(group, dt, system, course.bonds, motion, course.turn, work)

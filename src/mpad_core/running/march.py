@@ -134,12 +134,12 @@ def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits, s
     cells = len(state.wall_gaps)
     progress, trail = assembly.progress_of(len(coupling.groups), cells), assembly.trail_for(cells, bounds.most)
     dice = Dice(fixed.key, state.step, stride)
-    outcome, times, bonds, events = ROOM_NEEDED, 1, state.bonds, []
+    outcome, times, bonds, events, ahead = ROOM_NEEDED, 1, state.bonds, [], np.zeros((cells, 2))
     while outcome == ROOM_NEEDED:
         room = assembly.room_for(fixed, bonds, cells, data.neighbours, times)
         course = Course(
             data, bounds, dice, motion, np.empty((cells, 3, 3)), room.bonds, room.bound, room.candidates, clocks,
-            np.zeros((cells, 2)), progress, trail, room.events,
+            ahead, progress, trail, room.events,
         )  # fmt: skip
         outcome, group = burst(course)
         bonds = assembly.bond_list(room.bonds)
