@@ -250,9 +250,9 @@ def _candidates(fixed: Fixed, neighbours: Neighbours | None, times: int) -> Cand
     return Candidates(
         first, np.zeros(cells, np.int64), site, species, ligand, other, np.zeros(room), np.zeros(room),
         fixed.molecules.first,
-        np.zeros(cells, np.int64), np.empty(int(sites.sum()), np.int64), np.zeros((cells, 2)), np.zeros((cells, 2)),
-        np.zeros((cells, 2, 3)), np.zeros((cells, 2, 3)), facing, np.zeros(2 * pairs, np.int64),
-        np.empty(int(facing[-1]), np.int64), np.zeros((pairs, 2)), np.zeros((pairs, 2, 9)),
+        np.zeros(cells, np.int64), np.empty(int(sites.sum()), np.int64), np.zeros((cells, 3)), np.zeros((cells, 3)),
+        np.zeros((cells, 3, 3)), np.zeros((cells, 3, 3)), facing, np.zeros(2 * pairs, np.int64),
+        np.empty(int(facing[-1]), np.int64), np.zeros((pairs, 3)), np.zeros((pairs, 3, 9)),
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from mpad_core.numerics.compiled import compiled, compiled_lean
 from mpad_core.running.clocks import EARLY, LATE, choice, drawn, share_until, used_until
 from mpad_core.running.densities import holds
 from mpad_core.running.layout import Course, System, Work
-from mpad_core.running.listing import reaches_out, refresh
+from mpad_core.running.listing import is_too_far, refresh, wears_out
 from mpad_core.running.moving import advance, commit, refresh_turns, step_explicitly
 from mpad_core.running.reacting import happen, rates, slip_factors
 from mpad_core.running.resisting import is_positive_definite, resistance
@@ -168,15 +168,21 @@ def _all_ready(group: int, course: Course) -> bool:
 
 @compiled_lean
 def _strays(group: int, course: Course, work: Work) -> bool:
-    """Tell whether the way that is tried leads beyond what is listed, even if it were listed anew.
-
-    Lists that are merely old are marked, so that they are made anew, and the way is tried again.
-    """
-    groups = course.system.groups
+    """Tell whether the way that is tried is longer than any lists would stand."""
+    groups, strays = course.system.groups, False
     for k in range(groups.first[group], groups.first[group + 1]):
-        if reaches_out(groups.cells[k], course.system, work, course.listed):
-            return True
-    return False
+        strays = strays or is_too_far(groups.cells[k], course.system, course.motion, work, course.listed)
+    return strays
+
+
+@compiled_lean
+def _see_ahead(group: int, course: Course, work: Work) -> bool:
+    """Have those lists made anew that do not stand over the way that is tried; tell whether there was room."""
+    groups, ready = course.system.groups, True
+    for k in range(groups.first[group], groups.first[group + 1]):
+        if wears_out(groups.cells[k], course.system, work, course.listed):
+            ready = ready and _is_ready(groups.cells[k], course)
+    return ready
 
 
 @compiled_lean
@@ -224,9 +230,9 @@ def _move_group(group: int, course: Course, work: Work) -> int:
         error = _try_part(group, part, tick, course, work)
         shorter = _shorter(error, course)
         if shorter == 1.0 and _strays(group, course, work):
-            if not _all_ready(group, course):
-                return ROOM_NEEDED
-            shorter = 0.5 if _strays(group, course, work) else 1.0
+            shorter = 0.5
+        if shorter == 1.0 and not _see_ahead(group, course, work):
+            return ROOM_NEEDED
         share, whose = (1.0, -1) if shorter < 1.0 else _look_ahead(group, dt, course, work)
         if shorter < 1.0 or share < 0:
             if part == 1:

@@ -14,7 +14,7 @@ from mpad_core.running.places import distance, place_of
 
 NEAR_MARGIN = 0.3  # µm: molecules this far out of reach face each other
 MARGIN = 0.02  # µm: and these are candidates
-NEAR, FIRST = 1, 0  # levels of the two lists
+NEAR, FIRST, NOW = 1, 0, 2  # levels of the two lists; the last: the first, were it made now
 
 
 @compiled_inline
@@ -85,6 +85,15 @@ def _apart(cell: int, partner: int, centre: Array, system: System) -> float:
 
 
 @compiled_lean
+def note_first(
+    pair: int, level: int, cell: int, centre: Array, rotation: Array, system: System, listed: Candidates
+) -> None:
+    """Note from where candidates of a pair are listed, or would be, and how long they stand."""
+    apart = _apart(cell, system.neighbours.partner[pair], centre, system)
+    _note(pair, level, max(MARGIN, apart - _reach(system)), cell, centre, rotation, system, listed)
+
+
+@compiled_lean
 def list_facing(
     pair: int, cell: int, centre: Array, rotation: Array, turn: Array, system: System, listed: Candidates
 ) -> None:
@@ -133,9 +142,8 @@ def add_facing(
 ) -> bool:
     """Add to a cell's candidates what its molecules can bind to on a partner; tell whether there was room."""
     partner, species, molecules = system.neighbours.partner[pair], system.species, system.molecules
-    apart, reach = _apart(cell, partner, centre, system), _reach(system)
-    _note(pair, FIRST, max(MARGIN, apart - reach), cell, centre, rotation, system, listed)
-    farthest = shell_of(partner, system) + reach + MARGIN
+    note_first(pair, FIRST, cell, centre, rotation, system, listed)
+    farthest = shell_of(partner, system) + _reach(system) + MARGIN
     cx, cy, cz = centre[partner, 0], centre[partner, 1], centre[partner, 2]
     first = listed.facing_first[2 * pair]
     for k in range(first, first + listed.facing_number[2 * pair]):

@@ -213,15 +213,15 @@ class Candidates(NamedTuple):
     near_first: Indices  # (N + 1,) as first, for the molecules that are only near
     near_number: Indices  # (N,)
     near: Indices  # (S,) sites
-    slack: Array  # (N, 2) µm, how much nearer molecules may come before candidates, or near ones, must be listed anew
-    lever: Array  # (N, 2) µm, how far from the axis of the cell's turn the first to come would be
-    centre: Array  # (N, 2, 3) µm, of the cell when they were listed
-    turn: Array  # (N, 2, 3) motion.turn at that time
+    slack: Array  # (N, 3) µm, how much nearer molecules may come before candidates, or near ones, must be listed anew
+    lever: Array  # (N, 3) µm, how far from the axis of the cell's turn the first to come would be
+    centre: Array  # (N, 3, 3) µm, of the cell when they were listed
+    turn: Array  # (N, 3, 3) motion.turn at that time; in the third rows, all of it if candidates were listed now
     facing_first: Indices  # (2P + 1,) of the molecules of a pair's keeper, and of its partner, that face the other
     facing_number: Indices  # (2P,); a first one below zero: not listed yet
     facing: Indices  # (F,) sites
-    pair_slack: Array  # (P, 2) as slack
-    pair_from: Array  # (P, 2, 9) relative place and both turns at that time
+    pair_slack: Array  # (P, 3) as slack
+    pair_from: Array  # (P, 3, 9) relative place and both turns at that time
 
 
 class Course(NamedTuple):

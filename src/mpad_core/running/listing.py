@@ -10,7 +10,18 @@ import math
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled_lean
 from mpad_core.running.densities import density_at
-from mpad_core.running.facing import FIRST, MARGIN, NEAR, NEAR_MARGIN, add_facing, append, list_facing, nearer
+from mpad_core.running.facing import (
+    FIRST,
+    MARGIN,
+    NEAR,
+    NEAR_MARGIN,
+    NOW,
+    add_facing,
+    append,
+    list_facing,
+    nearer,
+    note_first,
+)
 from mpad_core.running.layout import Candidates, Dice, Motion, System, Work
 from mpad_core.running.places import SQUARE, height_of, ligand_at, ligands_of, place_of
 
@@ -39,7 +50,7 @@ def _nearer(cell: int, level: int, centre: Array, rotation: Array, system: Syste
     lever = listed.lever[cell, level]
     drop = max(listed.centre[cell, level, 2] - centre[cell, 2], 0.0)
     nearer = drop + math.sqrt(tx * tx + ty * ty) * lever
-    if level == FIRST and system.species.pairwise.any():
+    if level != NEAR and system.species.pairwise.any():
         shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
         slip_x = centre[cell, 0] - listed.centre[cell, level, 0] - shell * ty
         slip_y = centre[cell, 1] - listed.centre[cell, level, 1] + shell * tx
@@ -59,6 +70,13 @@ def _mark(
     for a in range(3):
         listed.centre[cell, level, a] = motion.centre[cell, a]
         listed.turn[cell, level, a] = motion.turn[cell, a]
+
+
+@compiled_lean
+def _mark_first(cell: int, level: int, lowest: float, system: System, motion: Motion, listed: Candidates) -> None:
+    """Note from where a cell's candidates are listed, or would be, and how long they stand."""
+    bottom = motion.centre[cell, 2] - system.bodies.radius[cell] - system.bodies.roughness[cell]
+    _mark(cell, level, max(MARGIN, bottom - lowest), lowest + MARGIN, system, motion, listed)
 
 
 @compiled_lean
@@ -104,8 +122,7 @@ def _list_candidates(
     """List what a cell's near molecules can bind to, or could after a short way; tell whether there was room."""
     molecules, species = system.molecules, system.species
     centre = motion.centre[cell]
-    bottom = centre[2] - system.bodies.radius[cell] - system.bodies.roughness[cell]
-    _mark(cell, FIRST, max(MARGIN, bottom - lowest), lowest + MARGIN, system, motion, listed)
+    _mark_first(cell, FIRST, lowest, system, motion, listed)
     listed.number[cell] = 0
     first = listed.near_first[cell]
     for n in range(first, first + listed.near_number[cell]):
@@ -171,14 +188,34 @@ def refresh(cell: int, system: System, motion: Motion, turn: Array, dice: Dice, 
 
 
 @compiled_lean
-def reaches_out(cell: int, system: System, work: Work, listed: Candidates) -> bool:
-    """Tell whether a way that is tried leads a cell beyond its lists, and have them made anew if it does."""
-    if system.species.site_kind.shape[0] == 0:
-        return False
-    beyond = bool(_nearer(cell, FIRST, work.centre, work.rotation, system, listed) > listed.slack[cell, FIRST])
+def _leads_beyond(cell: int, level: int, system: System, work: Work, listed: Candidates) -> bool:
+    """Tell whether a way that is tried leads a cell beyond its candidates of a level."""
+    beyond = bool(_nearer(cell, level, work.centre, work.rotation, system, listed) > listed.slack[cell, level])
     for pair in range(system.neighbours.first[cell], system.neighbours.first[cell + 1]):
-        way = nearer(pair, FIRST, cell, work.centre, work.rotation, system, listed)
-        beyond = beyond or way > listed.pair_slack[pair, FIRST]
-    if beyond:
-        listed.slack[cell, FIRST] = _OUTWORN
+        way = nearer(pair, level, cell, work.centre, work.rotation, system, listed)
+        beyond = beyond or way > listed.pair_slack[pair, level]
     return beyond
+
+
+@compiled_lean
+def is_too_far(cell: int, system: System, motion: Motion, work: Work, listed: Candidates) -> bool:
+    """Tell whether a way that is tried is longer than candidates listed at its start would stand.
+
+    Those that are listed may stand longer or shorter; it depends on when that was, and the length of a way must not.
+    """
+    first = system.molecules.first
+    if system.species.site_kind.shape[0] == 0 or first[cell] == first[cell + 1]:
+        return False
+    _mark_first(cell, NOW, reach_height(system), system, motion, listed)
+    for pair in range(system.neighbours.first[cell], system.neighbours.first[cell + 1]):
+        note_first(pair, NOW, cell, motion.centre, motion.turn, system, listed)
+    return _leads_beyond(cell, NOW, system, work, listed)
+
+
+@compiled_lean
+def wears_out(cell: int, system: System, work: Work, listed: Candidates) -> bool:
+    """Tell whether a way that is tried leads a cell beyond its lists, and have them made anew if it does."""
+    if system.species.site_kind.shape[0] == 0 or not _leads_beyond(cell, FIRST, system, work, listed):
+        return False
+    listed.slack[cell, FIRST] = _OUTWORN
+    return True
