@@ -1,0 +1,219 @@
+"""How a single cell rolls: ``python benchmarks/rolling.py WHAT``, one table of docs/results.md for each WHAT.
+
+Runs of ``rolling.toml`` with some of its values replaced. The first 2 s of each run are left out, so that the start does
+not count; all seeds of a case are pooled, and intervals are those of `mpad measure`. Runs that DIRECTORY (``--keep``)
+holds already are not run again.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from attrs import field, frozen
+from scipy.optimize import brentq
+
+from mpad_core import load_scene, quantity, run
+from mpad_core.studies.measures import bonds as of_bonds
+from mpad_core.studies.measures import rolling
+from mpad_core.studies.measures.bonds import CellBonds, bonds_of
+from mpad_core.studies.measures.estimates import Estimate, Sample, estimate, quantile, ratio
+from mpad_core.studies.measures.observations import Observation, observations
+from mpad_core.studies.measures.tracks import Track, resampled
+
+SCENE = Path(__file__).with_suffix(".toml")
+RECRUITMENT = SCENE.parents[1] / "examples/recruitment.toml"
+START = 2.0  # s, left out
+RADIUS = 5.0  # µm
+TOUCHING = 5.225  # µm, height at which tips touch
+REACH = 0.03  # µm, length of a bond
+WEIGHT = 0.2568  # pN
+SHORT, CAMERA = 0.01, 0.033  # s, intervals between frames
+
+
+@frozen(kw_only=True)
+class Case:
+    """What is replaced in the scene, under a name that is also the folder of its runs."""
+
+    name: str
+    shear: float = 80.0  # 1/s
+    settings: tuple[str, ...] = ()
+
+    def overrides(self, seconds: float, seed: int) -> list[str]:
+        """Give the settings as ``--set`` takes them."""
+        return [f'flow.rate="{self.shear:g} 1/s"', f'stop.time="{seconds:g} s"', f"seed={seed}", *self.settings]
+
+
+@frozen(kw_only=True, eq=False)
+class Rolled:
+    """All seeds of a case."""
+
+    case: Case
+    runs: Sequence[Observation]
+    cost: float = field(default=float("nan"))  # s of CPU for a simulated second; NaN: nothing was run
+
+    def filmed(self, every: float = SHORT) -> list[Track]:
+        """Give the tracks at a camera's interval."""
+        return [resampled(track, every, after=START) for o in self.runs for track in o.tracks]
+
+    @cached_property
+    def bonds(self) -> list[CellBonds]:
+        """Give the bonds of all runs."""
+        pairs = zip(self.runs, self.filmed(), strict=True)
+        return [b for o, t in pairs if o.lives is not None for b in bonds_of(o.lives, ["roller"], {"roller": t.times},
+                                                                             run=o.run)]  # fmt: skip
+
+    def speed(self) -> Estimate:
+        """Give the mean speed over γa."""
+        return scaled(estimate(rolling.velocity(self.filmed())), 1 / (self.case.shear * RADIUS))
+
+    def fluctuation(self, every: float) -> Estimate:
+        """Give s / U at a camera's interval."""
+        return estimate(rolling.relative_fluctuation(self.filmed(every)))
+
+    def number(self) -> Estimate:
+        """Give the mean number of bonds."""
+        return estimate(of_bonds.bond_number(self.bonds))
+
+    def free(self) -> float:
+        """Give the share of time without a bond."""
+        return float(of_bonds.bond_number_shares(self.bonds)[0])
+
+    def ruptures(self, share: float) -> Estimate:
+        """Give a quantile of the forces (pN) at which bonds broke."""
+        return quantile(of_bonds.rupture_forces(self.bonds), share, cells=1, seeds=len(self.runs))
+
+    def lifetime(self) -> Estimate:
+        """Give the mean lifetime of bonds (s)."""
+        return estimate(of_bonds.lifetime(self.bonds))
+
+    def height(self) -> Estimate:
+        """Give the mean height of the centre (µm)."""
+        return estimate(Sample(series=self.heights(), seeds=len(self.runs)))
+
+    def heights(self) -> list[np.ndarray]:
+        """Give the heights (µm) in the recorded frames, one series a seed."""
+        recorded = [o.trajectory for o in self.runs if o.trajectory is not None]
+        return [t.positions[t.times >= START, 0, 2] for t in recorded]
+
+
+def scaled(number: Estimate, factor: float) -> Estimate:
+    """Give a number in other units."""
+    return Estimate(number.value * factor, number.low * factor, number.high * factor)
+
+
+def text(number: Estimate, digits: int = 3) -> str:
+    """Give a number with its interval."""
+    return f"{number.value:.{digits}g} [{number.low:.{digits}g}, {number.high:.{digits}g}]"
+
+
+@frozen(kw_only=True)
+class Runs:
+    """Where runs are kept, and how many there are of each case."""
+
+    folder: Path
+    seeds: int
+    seconds: float  # of each, the start included
+
+    def of(self, case: Case) -> Rolled:
+        """Run a case with all its seeds, or read what is there."""
+        folders = [self.folder / f"{case.name}-{case.shear:g}-{seed}" for seed in range(1, self.seeds + 1)]
+        missing = [(f, s) for s, f in enumerate(folders, 1) if not (f / "summary.json").exists()]
+        before = time.process_time()
+        for folder, seed in missing:
+            run(load_scene(SCENE, case.overrides(self.seconds, seed)), folder)
+        spent = (time.process_time() - before) / (len(missing) * self.seconds) if missing else float("nan")
+        return Rolled(case=case, runs=observations(folders), cost=spent)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print a table, row by row as it comes."""
+    print("| " + " | ".join(heads) + " |\n|" + " --- |" * len(heads))
+    for row in rows:
+        print("| " + " | ".join(row) + " |", flush=True)
+
+
+MOTION_HEADS = ("U/γa", "s/U, 10 ms", "s/U, 33 ms", "bonds", "mean z, µm", "time without bond", "CPU s a second")
+
+
+def motion(seen: Rolled) -> tuple[str, ...]:
+    """Give what is told of every case."""
+    return (
+        *(text(seen.speed()), text(seen.fluctuation(SHORT)), text(seen.fluctuation(CAMERA)), text(seen.number())),
+        *(text(seen.height(), 6), f"{100 * seen.free():.2g} %", f"{seen.cost:.2g}"),
+    )
+
+
+def speed(runs: Runs) -> None:
+    """Print speeds at three shear rates, for two readings of reach (the paper has 0.015)."""
+    cases = [Case(name=reach, shear=shear, settings=(f'bonds.tether.reach="{reach}"',))
+             for reach in ("overlap", "pairs") for shear in (40, 80, 160)]  # fmt: skip
+    rows = ((case.name, f"{case.shear:g}", *motion(runs.of(case))) for case in cases)
+    table(("reach", "shear, 1/s", *MOTION_HEADS), rows)
+
+
+CONSTANTS = ((500, 2000), (500, 700), (500, 565), (50, 565), (5000, 565), (50, 330))  # pN µm, 1/µm
+
+
+def repulsion(runs: Runs) -> None:
+    """Print where cells roll, rest and pass for some constants of the repulsion."""
+    heads = ("F₀, pN µm", "τ, 1/µm", "resting δ, nm", "least δ upstream, nm", "and downstream", "δ > 0 for Δx, µm")
+    table((*heads, "z rolling, µm: 40", "80", "160 1/s"), (contact_row(runs, *pair) for pair in CONSTANTS))
+
+
+def contact_row(runs: Runs, strength: float, decay: float) -> tuple[str, ...]:
+    """Give one set of constants' row."""
+    settings = (f'repulsion.strength="{strength:g} pN um"', f'repulsion.decay="{decay:g} 1/um"')
+    name = f"contact-{strength:g}-{decay:g}"
+    heights = [text(runs.of(Case(name=name, shear=s, settings=settings)).height(), 6) for s in (40, 80, 160)]
+    found = passage(runs.folder / name, settings)
+    return f"{strength:g}", f"{decay:g}", f"{resting(strength, decay):.1f}", *found, *heights
+
+
+def resting(strength: float, decay: float) -> float:
+    """Give δ (nm) where repulsion carries the weight."""
+
+    def excess(gap: float) -> float:
+        return float(strength * decay / np.expm1(decay * gap) - WEIGHT)
+
+    return 1e3 * (brentq(excess, 1e-4, 1.0, xtol=1e-12) - REACH)
+
+
+def passage(folder: Path, settings: Sequence[str]) -> tuple[str, str, str]:
+    """Run the example of recruitment: least δ (nm) before and behind the rolling cell, and where δ is above zero."""
+    if not (folder / "summary.json").exists():
+        run(load_scene(RECRUITMENT, [*settings, "passage.control=false"]), folder)
+    seen = observations([folder])[0].trajectory
+    assert seen is not None
+    apart, overlap = seen.positions[:, 1, 0] - seen.positions[:, 0, 0], 1e3 * seen.overlaps[:, 1]
+    above = apart[overlap > 0]
+    return f"{overlap[apart < 0].min():.1f}", f"{overlap[apart > 0].min():.1f}", f"{above[0]:.0f} to {above[-1]:.0f}"
+
+
+WHAT: dict[str, tuple[Callable[[Runs], None], int, float]] = {
+    "speed": (speed, 4, 14.0),
+    "repulsion": (repulsion, 4, 7.0),
+}
+
+
+def main() -> None:
+    """Print one table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=WHAT)
+    parser.add_argument("--seeds", type=int, help="of each case")
+    parser.add_argument("--seconds", type=float, help="of each run, 2 s of start included")
+    parser.add_argument("--keep", type=Path, metavar="DIRECTORY", help="where runs stay, and are found again")
+    given = parser.parse_args()
+    show, seeds, seconds = WHAT[given.what]
+    with tempfile.TemporaryDirectory() as passing:
+        folder = given.keep or Path(passing)
+        runs = Runs(folder=folder, seeds=given.seeds or seeds, seconds=given.seconds or seconds)
+        print(f"{runs.seeds} seeds, {runs.seconds - START:g} s of each; 95 % intervals in brackets\n")
+        show(runs)
+
+
+if __name__ == "__main__":
+    main()
