@@ -1,22 +1,27 @@
 """How a single cell rolls: ``python benchmarks/rolling.py WHAT``, one table of docs/results.md for each WHAT.
 
-Runs of ``rolling.toml`` with some of its values replaced. The first 2 s of each run are left out, so that the start does
-not count; all seeds of a case are pooled, and intervals are those of `mpad measure`. Runs that DIRECTORY (``--keep``)
-holds already are not run again.
+Runs of ``rolling.toml`` with some of its values replaced. The first 2 s of each run are left out, so that the start
+does not count; all seeds of a case are pooled, and intervals are those of `mpad measure`. Runs that DIRECTORY
+(``--keep``) holds already are not run again.
 """
 
 import argparse
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from attrs import field, frozen
 from scipy.optimize import brentq
 
-from mpad_core import load_scene, quantity, run
+from mpad_core import load_scene, run
+from mpad_core.numerics.rotations import matrix_of
+from mpad_core.physics.molecules import place_sites
+from mpad_core.scene.compose import compose
+from mpad_core.scene.files import parse_scene
 from mpad_core.studies.measures import bonds as of_bonds
 from mpad_core.studies.measures import rolling
 from mpad_core.studies.measures.bonds import CellBonds, bonds_of
@@ -31,6 +36,8 @@ RADIUS = 5.0  # µm
 TOUCHING = 5.225  # µm, height at which tips touch
 REACH = 0.03  # µm, length of a bond
 WEIGHT = 0.2568  # pN
+THERMAL = 4.114e-3  # pN µm, kT
+WALL_TIPS = 0.05  # µm
 SHORT, CAMERA = 0.01, 0.033  # s, intervals between frames
 
 
@@ -90,6 +97,10 @@ class Rolled:
         """Give the mean lifetime of bonds (s)."""
         return estimate(of_bonds.lifetime(self.bonds))
 
+    def tensions(self, stiffness: float) -> np.ndarray:
+        """Give the tensions (pN) of all bonds alive at moments 50 ms apart, of slack ones zero."""
+        return np.concatenate([tension for o in self.runs for tension in tensions_of(o, stiffness)])
+
     def height(self) -> Estimate:
         """Give the mean height of the centre (µm)."""
         return estimate(Sample(series=self.heights(), seeds=len(self.runs)))
@@ -98,6 +109,28 @@ class Rolled:
         """Give the heights (µm) in the recorded frames, one series a seed."""
         recorded = [o.trajectory for o in self.runs if o.trajectory is not None]
         return [t.positions[t.times >= START, 0, 2] for t in recorded]
+
+
+def tensions_of(seen: Observation, stiffness: float) -> Iterator[np.ndarray]:
+    """Yield the tensions (pN) of the living bonds, moment by moment: from where the molecules and their anchors are."""
+    recorded = seen.trajectory
+    assert recorded is not None
+    arms, lives = place_sites(compose(parse_scene(recorded.header.scene))).arm, _lives(recorded.bond_events)
+    for moment in np.arange(START, recorded.times[-1], 0.05):
+        frame = int(np.searchsorted(recorded.times, moment))
+        turn, there = np.empty((3, 3)), lives[:, (lives[0]["time"] <= moment) & (lives[1]["time"] > moment)][0]
+        matrix_of(recorded.orientations[frame, 0], turn)
+        anchor = np.stack([there["anchor_x"], there["anchor_y"], np.full(len(there), WALL_TIPS)], axis=1)
+        span = recorded.positions[frame, 0] + arms[there["receptor"]] @ turn.T - anchor
+        yield stiffness * np.maximum(np.linalg.norm(span, axis=1) - REACH, 0.0)
+
+
+def _lives(events: np.ndarray) -> np.ndarray:
+    """Give forming and breaking of every bond that broke (2, B): a molecule has one bond at a time."""
+    ordered = events[np.lexsort((np.arange(len(events)), events["receptor"]))]
+    births = np.flatnonzero(ordered["kind"][:-1] == 0)
+    ended = births[ordered["receptor"][births + 1] == ordered["receptor"][births]]
+    return np.stack([ordered[ended], ordered[ended + 1]])
 
 
 def scaled(number: Estimate, factor: float) -> Estimate:
@@ -161,16 +194,18 @@ CONSTANTS = ((500, 2000), (500, 700), (500, 565), (50, 565), (5000, 565), (50, 3
 def repulsion(runs: Runs) -> None:
     """Print where cells roll, rest and pass for some constants of the repulsion."""
     heads = ("F₀, pN µm", "τ, 1/µm", "resting δ, nm", "least δ upstream, nm", "and downstream", "δ > 0 for Δx, µm")
-    table((*heads, "z rolling, µm: 40", "80", "160 1/s"), (contact_row(runs, *pair) for pair in CONSTANTS))
+    table(
+        (*heads, "z rolling, µm: 40", "80", "160 1/s", "U/γa, 80 1/s"), (contact_row(runs, *pair) for pair in CONSTANTS)
+    )
 
 
 def contact_row(runs: Runs, strength: float, decay: float) -> tuple[str, ...]:
     """Give one set of constants' row."""
     settings = (f'repulsion.strength="{strength:g} pN um"', f'repulsion.decay="{decay:g} 1/um"')
     name = f"contact-{strength:g}-{decay:g}"
-    heights = [text(runs.of(Case(name=name, shear=s, settings=settings)).height(), 6) for s in (40, 80, 160)]
-    found = passage(runs.folder / name, settings)
-    return f"{strength:g}", f"{decay:g}", f"{resting(strength, decay):.1f}", *found, *heights
+    seen = [runs.of(Case(name=name, shear=s, settings=settings)) for s in (40, 80, 160)]
+    found = (*passage(runs.folder / name, settings), *(text(r.height(), 6) for r in seen), text(seen[1].speed()))
+    return f"{strength:g}", f"{decay:g}", f"{resting(strength, decay):.1f}", *found
 
 
 def resting(strength: float, decay: float) -> float:
@@ -179,7 +214,7 @@ def resting(strength: float, decay: float) -> float:
     def excess(gap: float) -> float:
         return float(strength * decay / np.expm1(decay * gap) - WEIGHT)
 
-    return 1e3 * (brentq(excess, 1e-4, 1.0, xtol=1e-12) - REACH)
+    return 1e3 * (brentq(excess, 1e-4, 0.1, xtol=1e-12) - REACH)
 
 
 def passage(folder: Path, settings: Sequence[str]) -> tuple[str, str, str]:
@@ -193,9 +228,81 @@ def passage(folder: Path, settings: Sequence[str]) -> tuple[str, str, str]:
     return f"{overlap[apart < 0].min():.1f}", f"{overlap[apart > 0].min():.1f}", f"{above[0]:.0f} to {above[-1]:.0f}"
 
 
+MODELS = {"slip": '{name="bell", preset="p-selectin"}', "catch": '{name="catch-slip", preset="p-selectin"}'}
+SHEARS = (0.5, 1, 2, 5, 10, 20, 40, 80, 160)  # 1/s
+SETS = ((90, 100.0), (30, 100.0), (30, 0.1))  # sites on the cell, 1/µm²; stiffness, pN/nm
+
+
+def catch(runs: Runs) -> None:
+    """Print speed against shear for a catch bond beside a slip bond."""
+    heads = ("bond", "sites, 1/µm²", "stiffness, pN/nm", "shear, 1/s", "U, µm/s", *MOTION_HEADS[:-1])
+    rows = (catch_row(runs.of(case), *pair) for case, pair in catch_cases())
+    table((*heads, "bonds under tension", "their mean tension, pN", "lifetime of bonds, ms"), rows)
+
+
+def catch_cases() -> Iterator[tuple[Case, tuple[int, float]]]:
+    """Yield both bonds, with all sites and stiffnesses, at all shear rates."""
+    for (sites, stiffness), (bond, model), shear in product(SETS, MODELS.items(), SHEARS):
+        settings = (
+            f"bonds.tether.model={model}",
+            f'kinds.bead.sites.slex.density="{sites} 1/um^2"',
+            f'bonds.tether.stiffness="{stiffness:g} pN/nm"',
+        )
+        yield Case(name=f"{bond}-{sites}-{stiffness:g}", shear=shear, settings=settings), (sites, stiffness)
+
+
+def catch_row(seen: Rolled, sites: int, stiffness: float) -> tuple[str, ...]:
+    """Give the row of one case."""
+    tension = seen.tensions(1e3 * stiffness)
+    taut = tension[tension > 0]
+    loaded = f"{len(taut) / len(tension) * seen.number().value:.3g}", f"{taut.mean():.3g}"
+    asked = (seen.case.name.split("-")[0], f"{sites}", f"{stiffness:g}", f"{seen.case.shear:g}")
+    speed = estimate(rolling.velocity(seen.filmed()))
+    return *asked, text(speed), *motion(seen)[:-1], *loaded, text(scaled(seen.lifetime(), 1e3))
+
+
+SELECTINS = ("p-selectin", "p-selectin-smith", "e-selectin", "e-selectin-alon", "l-selectin")
+
+
+def selectins(runs: Runs) -> None:
+    """Print speeds at 100 1/s for presets of Bell's bond, and by that of the first."""
+    seen = [runs.of(Case(name=s, shear=100, settings=(f'bonds.tether.model={{name="bell", preset="{s}"}}',)))
+            for s in SELECTINS]  # fmt: skip
+    first = rolling.velocity(seen[0].filmed())
+    rows = ((s, *motion(r), text(ratio(rolling.velocity(r.filmed()), first)))
+            for s, r in zip(SELECTINS, seen, strict=True))  # fmt: skip
+    table(("preset", *MOTION_HEADS, "U, by that of the first"), rows)
+
+
+def thermal(runs: Runs) -> None:
+    """Print how high a free cell is on the mean, beside Boltzmann, and how a bound one rolls with heat and without."""
+    free = Case(name="thermal-free", settings=("cells.roller.binds=false", 'effects.thermal="on"'))
+    exact = boltzmann(500.0, 565.0)
+    seen = [1e3 * (z - TOUCHING) for z in runs.of(free).heights()]
+    found = [estimate(Sample(series=[gap**power for gap in seen], seeds=runs.seeds)) for power in (1, 2)]
+    rows = (
+        [f"mean of tip gap^{n}, nm^{n}", text(f, 4), f"{e:.4g}"] for n, f, e in zip((1, 2), found, exact, strict=True)
+    )
+    table(("free cell, 80 1/s", "found", "Boltzmann"), rows)
+    print()
+    cases = [Case(name=f"thermal-{on}", settings=(f'effects.thermal="{on}"',)) for on in ("off", "on")]
+    table(("thermal", *MOTION_HEADS), ((c.name.split("-")[1], *motion(runs.of(c))) for c in cases))
+
+
+def boltzmann(strength: float, decay: float) -> tuple[float, float]:
+    """Give the means of the tip gap (nm) and of its square, by Boltzmann's law."""
+    gap = np.linspace(1e-4, 0.6, 600_001)
+    energy = WEIGHT * gap - strength * np.log(-np.expm1(-decay * gap))
+    weight = np.exp(-(energy - energy.min()) / THERMAL)
+    return tuple(float(np.average((1e3 * gap) ** power, weights=weight)) for power in (1, 2))
+
+
 WHAT: dict[str, tuple[Callable[[Runs], None], int, float]] = {
     "speed": (speed, 4, 14.0),
-    "repulsion": (repulsion, 4, 7.0),
+    "repulsion": (repulsion, 3, 7.0),
+    "catch": (catch, 4, 10.0),
+    "selectins": (selectins, 4, 12.0),
+    "thermal": (thermal, 4, 12.0),
 }
 
 
