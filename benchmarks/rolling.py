@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from attrs import field, frozen
@@ -150,6 +151,7 @@ class Runs:
     folder: Path
     seeds: int
     seconds: float  # of each, the start included
+    picture: Path | None = None  # to draw, where there is one
 
     def of(self, case: Case) -> Rolled:
         """Run a case with all its seeds, or read what is there."""
@@ -214,7 +216,7 @@ def resting(strength: float, decay: float) -> float:
     def excess(gap: float) -> float:
         return float(strength * decay / np.expm1(decay * gap) - WEIGHT)
 
-    return 1e3 * (brentq(excess, 1e-4, 0.1, xtol=1e-12) - REACH)
+    return 1e3 * (float(brentq(excess, 1e-4, 0.1, xtol=1e-12)) - REACH)
 
 
 def passage(folder: Path, settings: Sequence[str]) -> tuple[str, str, str]:
@@ -233,11 +235,27 @@ SHEARS = (0.5, 1, 2, 5, 10, 20, 40, 80, 160)  # 1/s
 SETS = ((90, 100.0), (30, 100.0), (30, 0.1))  # sites on the cell, 1/µm²; stiffness, pN/nm
 
 
+@frozen(kw_only=True)
+class Sheared:
+    """One bond at one shear rate, as the table and the picture show it."""
+
+    bond: str
+    sites: int  # 1/µm²
+    stiffness: float  # pN/nm
+    shear: float  # 1/s
+    speed: Estimate  # over γa
+    taut: float  # bonds under tension
+    tension: float  # pN, their mean
+    told: tuple[str, ...]
+
+
 def catch(runs: Runs) -> None:
     """Print speed against shear for a catch bond beside a slip bond."""
     heads = ("bond", "sites, 1/µm²", "stiffness, pN/nm", "shear, 1/s", "U, µm/s", *MOTION_HEADS[:-1])
-    rows = (catch_row(runs.of(case), *pair) for case, pair in catch_cases())
-    table((*heads, "bonds under tension", "their mean tension, pN", "lifetime of bonds, ms"), rows)
+    found = [sheared(runs.of(case), *pair) for case, pair in catch_cases()]
+    table((*heads, "lifetime of bonds, ms", "bonds under tension", "their mean tension, pN"), (f.told for f in found))
+    if runs.picture:
+        draw(found, runs.picture)
 
 
 def catch_cases() -> Iterator[tuple[Case, tuple[int, float]]]:
@@ -251,27 +269,62 @@ def catch_cases() -> Iterator[tuple[Case, tuple[int, float]]]:
         yield Case(name=f"{bond}-{sites}-{stiffness:g}", shear=shear, settings=settings), (sites, stiffness)
 
 
-def catch_row(seen: Rolled, sites: int, stiffness: float) -> tuple[str, ...]:
-    """Give the row of one case."""
-    tension = seen.tensions(1e3 * stiffness)
-    taut = tension[tension > 0]
-    loaded = f"{len(taut) / len(tension) * seen.number().value:.3g}", f"{taut.mean():.3g}"
-    asked = (seen.case.name.split("-")[0], f"{sites}", f"{stiffness:g}", f"{seen.case.shear:g}")
-    speed = estimate(rolling.velocity(seen.filmed()))
-    return *asked, text(speed), *motion(seen)[:-1], *loaded, text(scaled(seen.lifetime(), 1e3))
+def sheared(seen: Rolled, sites: int, stiffness: float) -> Sheared:
+    """Work out one case."""
+    bond, shear, tension = seen.case.name.split("-")[0], seen.case.shear, seen.tensions(1e3 * stiffness)
+    mean = float(tension[tension > 0].mean())
+    taut = float((tension > 0).mean()) * seen.number().value
+    asked = (bond, f"{sites}", f"{stiffness:g}", f"{shear:g}", text(estimate(rolling.velocity(seen.filmed()))))
+    told = (*asked, *motion(seen)[:-1], text(scaled(seen.lifetime(), 1e3)), f"{taut:.3g}", f"{mean:.3g}")
+    return Sheared(
+        bond=bond, sites=sites, stiffness=stiffness, shear=shear, speed=seen.speed(), taut=taut, tension=mean, told=told
+    )
 
 
-SELECTINS = ("p-selectin", "p-selectin-smith", "e-selectin", "e-selectin-alon", "l-selectin")
+def draw(found: Sequence[Sheared], file: Path) -> None:
+    """Draw speed and tension against shear."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 4.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(1, 2, sharex=True)
+    for colour, (sites, stiffness) in zip(("#1b4965", "#e09f3e", "#c1121f"), SETS, strict=True):
+        for bond, style in (("catch", "o-"), ("slip", "s:")):
+            points = [f for f in found if (f.bond, f.sites, f.stiffness) == (bond, sites, stiffness)]
+            draw_line(panels, points, style, colour, f"{bond}: {sites} sites/µm², {stiffness:g} pN/nm")
+    panels[0].axhline(0.67, color="0.7", linewidth=1)
+    panels[0].text(0.5, 0.7, "free cell", color="0.4", va="bottom", fontsize=8)
+    panels[1].axhline(11.8, color="0.7", linewidth=1)
+    panels[1].text(160, 12.4, "longest life of the catch bond, 11.8 pN", color="0.4", ha="right", fontsize=8)
+    panels[0].set(xscale="log", yscale="log", xlabel="shear rate (1/s)", ylabel="U / γa", ylim=(7e-4, 1.1))
+    panels[1].set(xscale="log", yscale="log", xlabel="shear rate (1/s)", ylabel="mean tension of taut bonds (pN)")
+    panels[1].legend(frameon=False, fontsize=8, loc="upper left")
+    figure.savefig(file, dpi=150)
+
+
+def draw_line(panels: Sequence[Any], points: Sequence[Sheared], style: str, colour: str, label: str) -> None:
+    """Draw one set's speeds with their intervals, and its tensions."""
+    shears, speeds = [f.shear for f in points], np.array([f.speed.value for f in points])
+    ends = np.array([[max(f.speed.low, 1e-6), f.speed.high] for f in points]).T
+    errors = np.nan_to_num(np.abs(ends - speeds))
+    panels[0].errorbar(shears, speeds, errors, fmt=style, color=colour, markersize=4, capsize=2)
+    panels[1].plot(shears, [f.tension for f in points], style, color=colour, markersize=4, label=label)
+
+
+SELECTINS = ("p-selectin", "p-selectin-smith", "p-selectin-alon", "e-selectin", "e-selectin-alon", "l-selectin")
 
 
 def selectins(runs: Runs) -> None:
-    """Print speeds at 100 1/s for presets of Bell's bond, and by that of the first."""
-    seen = [runs.of(Case(name=s, shear=100, settings=(f'bonds.tether.model={{name="bell", preset="{s}"}}',)))
-            for s in SELECTINS]  # fmt: skip
-    first = rolling.velocity(seen[0].filmed())
-    rows = ((s, *motion(r), text(ratio(rolling.velocity(r.filmed()), first)))
-            for s, r in zip(SELECTINS, seen, strict=True))  # fmt: skip
-    table(("preset", *MOTION_HEADS, "U, by that of the first"), rows)
+    """Print speeds at 100 1/s for presets of Bell's bond, and that of the last by each."""
+    cases = [
+        Case(name=name, shear=100, settings=(f'bonds.tether.model={{name="bell", preset="{name}"}}',))
+        for name in SELECTINS
+    ]
+    seen = [runs.of(case) for case in cases]
+    last = rolling.velocity(seen[-1].filmed())
+    rows = ((r.case.name, *motion(r), text(ratio(last, rolling.velocity(r.filmed())))) for r in seen)
+    table(("preset", *MOTION_HEADS, f"U of {SELECTINS[-1]}, by this"), rows)
 
 
 def thermal(runs: Runs) -> None:
@@ -294,7 +347,8 @@ def boltzmann(strength: float, decay: float) -> tuple[float, float]:
     gap = np.linspace(1e-4, 0.6, 600_001)
     energy = WEIGHT * gap - strength * np.log(-np.expm1(-decay * gap))
     weight = np.exp(-(energy - energy.min()) / THERMAL)
-    return tuple(float(np.average((1e3 * gap) ** power, weights=weight)) for power in (1, 2))
+    mean, square = (float(np.average((1e3 * gap) ** power, weights=weight)) for power in (1, 2))
+    return mean, square
 
 
 WHAT: dict[str, tuple[Callable[[Runs], None], int, float]] = {
@@ -312,12 +366,13 @@ def main() -> None:
     parser.add_argument("what", choices=WHAT)
     parser.add_argument("--seeds", type=int, help="of each case")
     parser.add_argument("--seconds", type=float, help="of each run, 2 s of start included")
+    parser.add_argument("--picture", type=Path, metavar="FILE", help="of the table, where there is one: catch")
     parser.add_argument("--keep", type=Path, metavar="DIRECTORY", help="where runs stay, and are found again")
     given = parser.parse_args()
     show, seeds, seconds = WHAT[given.what]
     with tempfile.TemporaryDirectory() as passing:
         folder = given.keep or Path(passing)
-        runs = Runs(folder=folder, seeds=given.seeds or seeds, seconds=given.seconds or seconds)
+        runs = Runs(folder=folder, seeds=given.seeds or seeds, seconds=given.seconds or seconds, picture=given.picture)
         print(f"{runs.seeds} seeds, {runs.seconds - START:g} s of each; 95 % intervals in brackets\n")
         show(runs)
 
