@@ -78,7 +78,9 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         wall_roughness=scene.wall.roughness if scene.wall else -np.inf,
         species=species,
         contact=scene.repulsion.instance if scene.repulsion and effects["repulsion"].on else None,
-        tolerances=Tolerances(position=scene.accuracy.position, rate=scene.accuracy.rate),
+        tolerances=Tolerances(
+            position=scene.accuracy.position, rate=scene.accuracy.rate, euler=scene.accuracy.explicit
+        ),
         caught=CaughtWhen(bound_for=scene.record.caught.bound_for, slower_than=scene.record.caught.slower_than),
         seed=scene.seed,
         thermal_energy=thermal_energy(scene.fluid.temperature) if effects["thermal"].on else 0.0,

@@ -137,6 +137,9 @@ class Accuracy:
 
     position: float = _measure("um", Within(0, 1, above=True), default=1e-4, doc="error of a position over one step")
     rate: float = _says("relative error of the rates of bond events", default=1e-3, valid=Within(0, 1, above=True))
+    explicit: float = _measure(
+        "s", Within(0, 1e-3), default=0.0, doc="step of explicit Euler, for comparison; 0: implicit, of any length"
+    )
 
 
 @frozen(kw_only=True)
