@@ -65,7 +65,7 @@ def _mark(
     """Note where a cell was when its molecules below a height were listed, and how much nearer others may come."""
     shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
     depth = min(max(highest - motion.centre[cell, 2] + shell, 0.0), shell)
-    listed.lever[cell, level] = math.sqrt(depth * (2 * shell - depth)) + slack
+    listed.lever[cell, level] = min(math.sqrt(depth * (2 * shell - depth)) + slack, shell)
     listed.slack[cell, level] = slack
     for a in range(3):
         listed.centre[cell, level, a] = motion.centre[cell, a]
