@@ -8,7 +8,7 @@ from attrs import evolve
 from scipy.spatial.transform import Rotation
 
 from bridged import SHELL, bond_loads, bonded, matrices_of, problem_of, with_molecules
-from mpad_core.physics.coupling import contact_range, joined
+from mpad_core.physics.coupling import Coupling, contact_range, joined
 from mpad_core.running import assembly, moving
 from mpad_core.running.layout import Work
 from mpad_core.running.march import configuration_of, make_ready
@@ -98,3 +98,19 @@ def test_stiffness_of_bonds_between_cells(held: Any) -> None:
     assert set(bench.cells) <= {0, 1, 2} - set(held)
     assert size == (18 if not held else 6 if held == (1,) else 12)
     assert np.abs(stiffness - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_groups_that_bonds_link_become_one() -> None:
+    """In any order; what is held is in no group, and what coupled the cells of each group stays."""
+    groups = tuple(np.array(g) for g in ([0, 3], [1], [2, 5]))
+    matrices = tuple(np.full((6 * len(g), 6 * len(g)), 1.0 + k) for k, g in enumerate(groups))
+    coupling = Coupling(groups=groups, matrices=matrices, loads=np.zeros((6, 6)))
+    same = joined(coupling, np.array([[0, 3], [1, 4]]))
+    assert [g.tolist() for g in same.groups] == [[0, 3], [1], [2, 5]]
+    one = joined(coupling, np.array([[5, 1], [1, 2], [2, 0]]))
+    assert sorted(one.groups[0].tolist()) == [0, 1, 2, 3, 5]
+    places = one.groups[0].tolist().index
+    assert one.matrices[0].shape == (30, 30)
+    for i, j, wanted in ((0, 3, 1.0), (1, 1, 2.0), (2, 5, 3.0), (0, 1, 0.0), (3, 5, 0.0), (1, 2, 0.0)):
+        o, p = 6 * places(i), 6 * places(j)
+        assert (one.matrices[0][o : o + 6, p : p + 6] == wanted).all()

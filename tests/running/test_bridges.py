@@ -217,6 +217,15 @@ def test_a_march_goes_on_from_a_stored_state_bit_for_bit(lab: Any, same: Any, cr
     assert same(lab.last(make_again(lab, machine), states[-1].time, middle), states[-1])
 
 
+@pytest.mark.parametrize(("name", "wrong"), [("partner", 3), ("ligand", 10**6)])
+def test_a_stored_bond_to_what_is_not_there_is_refused(crowd: Any, name: str, wrong: int) -> None:
+    machine, states = crowd
+    arrays = to_arrays(states[-1])
+    arrays[f"bonds.{name}"] = np.where(states[-1].bonds.partner >= 0, wrong, arrays[f"bonds.{name}"])
+    with pytest.raises(ValueError, match="between cells"):
+        from_arrays(arrays, len(machine.problem.radii), len(machine.fixed.molecules.kind))
+
+
 def make_again(lab: Any, machine: Any) -> Any:
     pace = machine.pace
     return lab.ready(machine.problem, sub_step=pace.sub_step, longest=pace.longest, euler=pace.euler)
@@ -238,8 +247,8 @@ def tight(fixed: Any, bonds: Any, cells: int, neighbours: Any = None, times: int
 ROOMY = assembly.room_for
 
 
-@pytest.mark.parametrize("scheme", ["crowd", "passing", "explicit"])
-def test_rooms_that_are_too_small_change_nothing(lab: Any, same: Any, scheme: str, monkeypatch: Any) -> None:
+@pytest.mark.parametrize(("scheme", "few"), [("crowd", 2), ("crowd", 512), ("passing", 512), ("explicit", 512)])
+def test_rooms_that_are_too_small_change_nothing(lab: Any, same: Any, scheme: str, few: int, monkeypatch: Any) -> None:
     """A burst that asks for more room goes on with it as if nothing had happened, also where lists are as yet good."""
     if scheme == "passing":
         machine, until = passing(lab, sub_step=1e-3, longest=1e-2, on=2e3, off=4e3), 0.03
@@ -250,7 +259,7 @@ def test_rooms_that_are_too_small_change_nothing(lab: Any, same: Any, scheme: st
         machine, until = lab.ready(problem, sub_step=2e-4, longest=4e-3, euler=euler), 0.01
     roomy, asked = lab.states(machine, until), []
     monkeypatch.setattr(assembly, "room_for", lambda *args: asked.append(args[-1]) or tight(*args))
-    monkeypatch.setattr(assembly, "_FEW", 2)
+    monkeypatch.setattr(assembly, "_FEW", few)
     tightly = lab.states(make_again(lab, machine), until) if scheme != "passing" else lab.states(machine, until)
     assert same(tightly[-1], roomy[-1])
     assert sum(len(s.events) for s in roomy) > 30
