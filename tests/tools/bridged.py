@@ -46,6 +46,7 @@ between = ["slex", "selectin"]
 model = {{ name = "bell", off_rate = "50 1/s", reactive_compliance = "4e-5 um" }}
 on_rate = {{ value = "84 1/s", at_density = "180 1/um^2" }}
 length = "30 nm"
+reach = "overlap"
 stiffness = "1e3 pN/um"
 """
 REPULSION = '[repulsion]\nstrength = "500 pN um"\ndecay = "565 1/um"\n'
