@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled, compiled_lean
+from mpad_core.numerics.compiled import compiled, compiled_lean, compiled_within
 from mpad_core.running.clocks import EARLY, LATE, choice, drawn, share_until, used_until
 from mpad_core.running.densities import holds
 from mpad_core.running.layout import Course, System, Work
@@ -357,7 +357,7 @@ def _note(course: Course) -> None:
     progress.trail[0] = at + 1
 
 
-@compiled
+@compiled_within
 def _sub_step(course: Course, works: list[Work], at_rest: Array, factor: Array) -> tuple[int, int]:
     """Go through what is left of the sub-step that is under way; see `burst`."""
     groups, progress = course.system.groups, course.progress
