@@ -2,7 +2,7 @@
 
 Runs of ``rolling.toml`` with some of its values replaced. The first 2 s of each run are left out, so that the start
 does not count; all seeds of a case are pooled, and intervals are those of `mpad measure`. Runs that DIRECTORY
-(``--keep``) holds already are not run again.
+(``--keep``) holds already are not run again, however long they are.
 """
 
 import argparse
