@@ -103,7 +103,8 @@ def test_heights_are_boltzmanns_over_a_long_time(lab: Any) -> None:
 
 def test_free_diffusion(lab: Any) -> None:
     """Far from everything every step is one of independent normal displacements and turns of known variance."""
-    machine = lab.machine({"a": 'height = "0 um"'}, wall=False, thermal="on")
+    problem = lab.problem({"a": 'height = "0 um"'}, wall=False, thermal="on")
+    machine = lab.ready(problem, longest=0.01)
     states = lab.states(machine, 8.0)
     times = np.diff([state.time for state in states])[:, None]
     moved = np.diff([state.centres[0] for state in states], axis=0)
