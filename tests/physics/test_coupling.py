@@ -182,7 +182,7 @@ def test_groups_by_gap_and_by_touch(problem: Any) -> None:
 def test_free_motion_keeps_the_digits_of_both(problem: Any) -> None:
     asked = problem(CENTRES)
     plan = asked.solver.plan(asked.setting)
-    mobility, free = free_motion(asked.solver, plan, asked.setting, at(asked), typical_speed(asked))
+    mobility, free, _ = free_motion(asked.solver, plan, asked.setting, at(asked), typical_speed(asked))
     expected = mobility_matrix(asked.solver, CENTRES, 5.0, viscosity=VISCOSITY)
     scale = np.sqrt(np.diag(expected))
     assert (np.abs(mobility - expected) / np.outer(scale, scale)).max() < 1e-10

@@ -10,8 +10,8 @@ from attrs import evolve
 from mpad_core.physics.coupling import lone_velocity
 from mpad_core.physics.measures import hazards
 from mpad_core.physics.state import State
+from mpad_core.running.capturing import with_captures
 from mpad_core.running.frames import frame_of, frames
-from mpad_core.running.march import _with_captures
 from mpad_core.running.schedules import Cadence, Schedule
 from mpad_core.running.stopping import StopWhen, first_that_holds
 
@@ -184,7 +184,7 @@ def seen(machine: Any, states: list[Any]) -> list[Any]:
         if found:
             kept = {n: getattr(found[-1], n) for n in ("bound_since", "bound_at", "caught_since")}
             state = evolve(state, **kept)
-        found.append(_with_captures(machine.problem, state))
+        found.append(with_captures(machine.problem, state))
     return found
 
 

@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from mpad_core.numerics.streams import mixed, uniform
 from mpad_core.physics.coupling import lone_cell
 from mpad_core.running import assembly, moving
-from mpad_core.running.burst import _work_for
-from mpad_core.running.moving import advance, attach, commit, refresh_turns
+from mpad_core.running.moving import advance, commit, refresh_turns
 from mpad_core.running.resisting import is_positive_definite, solve_in_place
+from sub_steps import work_for
 
 STIFFNESS, REST, STRENGTH, DECAY = 1e5, 0.03, 500.0, 565.0
 
@@ -25,25 +25,24 @@ class Bench:
         problem = machine.problem
         configuration = assembly_configuration(problem, state)
         coupling = machine.coupler.at(configuration, state.mean_loads, None)
-        self.system = assembly.system(problem, machine.fixed, state, coupling, reach)
+        around = machine.rasters.at(state.centres)
+        self.system = assembly.system(problem, machine.fixed, state, coupling, reach, around)
         self.bonds = assembly.room_for(machine.fixed, state.bonds, len(state.wall_gaps)).bonds
         self.motion = assembly.motion_of(state)
         self.turns = np.empty((len(state.wall_gaps), 3, 3))
         refresh_turns(self.motion, self.turns)
-        for cell, turn in enumerate(self.turns):
-            attach(cell, turn, self.system.molecules, self.bonds)
 
     def loads(self, group: int, moved: Any) -> tuple[Any, Any]:
         """Give loads and stiffness of a group displaced and turned."""
-        m = len(moved)
-        load, stiffness = np.zeros(m), np.zeros((m, m))
-        moving._add_loads(group, np.ascontiguousarray(moved), self.system, self.bonds, self.motion, load, stiffness)
-        return load, stiffness
+        work = work_for(group, self.system, self.motion, self.turns)
+        work.moved[:] = moved
+        moving._add_loads(group, self.system, self.bonds, self.motion, self.turns, work)
+        return work.load, work.stiffness
 
     def advance(self, dt: float, group: int = 0) -> float:
         """Try to move a group, and let it be there if it can; give the error."""
-        work = _work_for(group, self.system)
-        error = float(advance(group, dt, self.system, self.bonds, self.motion, work))
+        work = work_for(group, self.system, self.motion, self.turns)
+        error = float(advance(group, dt, self.system, self.bonds, self.motion, self.turns, work))
         if error < np.inf:
             commit(group, dt, self.system, self.motion, self.turns, work)
         return error

@@ -14,10 +14,10 @@ from mpad_core.physics import fluctuations
 from mpad_core.physics.coupling import NoDrift
 from mpad_core.physics.state import from_arrays, to_arrays
 from mpad_core.running import assembly
-from mpad_core.running.burst import _work_for
 from mpad_core.running.march import configuration_of
-from mpad_core.running.moving import advance
+from mpad_core.running.moving import advance, refresh_turns
 from mpad_core.running.shaking import TICKS, draw, path
+from sub_steps import work_for
 
 KT = 0.00411433402  # pN µm, at 298 K
 KEY = key_of(5)
@@ -48,13 +48,17 @@ class Shaken:
         coupling = machine.coupler.at(configuration, state.mean_loads, None)
         coupling = machine.drift.added(coupling, configuration, state.step)
         self.machine, self.state = machine, state
-        self.system = assembly.system(machine.problem, machine.fixed, state, coupling, -np.inf)
+        self.system = assembly.system(
+            machine.problem, machine.fixed, state, coupling, -np.inf, machine.rasters.at(state.centres)
+        )
 
     def displacement(self, noise: Any, dt: float) -> Any:
-        motion, work = assembly.motion_of(self.state), _work_for(0, self.system)
+        motion, turn = assembly.motion_of(self.state), np.empty((len(self.state.wall_gaps), 3, 3))
+        refresh_turns(motion, turn)
+        work = work_for(0, self.system, motion, turn)
         bonds = assembly.room_for(self.machine.fixed, self.state.bonds, len(self.state.wall_gaps)).bonds
         work.noise[:] = noise
-        assert advance(0, dt, self.system, bonds, motion, work) < np.inf
+        assert advance(0, dt, self.system, bonds, motion, turn, work) < np.inf
         moved = np.hstack([work.centre - self.state.centres, work.rotation])
         return moved[~self.machine.problem.held].ravel()
 
