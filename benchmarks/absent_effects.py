@@ -4,7 +4,7 @@ The burst treats an absent effect as tables and lists of length zero, and never 
 once more with every call and loop that belongs to bonds, contacts and thermal motion struck out, and both are timed in
 turn (CPU time of the thread) on scenes without any; they must also give the same bits. Then each part by itself.
 
-    python benchmarks/absent_effects.py [--repeats 31] [--sub-steps 2000]
+    python benchmarks/absent_effects.py [--repeats 31] [--sub-steps 2000] [WHAT …]
 """
 
 import argparse
@@ -21,7 +21,7 @@ import numpy as np
 
 from mpad_core.running import assembly, burst, march, moving, pace
 from mpad_core.running.initial import at_rest
-from mpad_core.running.layout import Dice
+from mpad_core.running.layout import Course, Dice
 from mpad_core.scene.compose import compose
 from mpad_core.scene.files import parse_scene
 
@@ -44,14 +44,14 @@ x = "-14 um"
 height = "6 um"
 """
 STRUCK = {  # what each bare burst does without: calls, loops over what is absent, and conditions
-    "everything": ("break_bonds", "form_bonds", "attach", "_list_is_short", "attached.first", "contacts.pair_first",
-                   "contacts.reach", "thermal.energy"),
-    "reactions": ("break_bonds", "form_bonds", "_list_is_short"),
-    "sorting of bonds": ("attach",),
-    "loads of bonds": ("attached.first",),
+    "everything": ("_all_ready", "_strays", "_see_ahead", "_look_ahead", "_use_up", "bonds.number", "holds",
+                   "contacts.pair_first", "contacts.reach", "thermal.energy"),
+    "reactions": ("_all_ready", "_strays", "_see_ahead", "_look_ahead", "_use_up"),
+    "loads of bonds": ("bonds.number",),
     "contacts": ("contacts.pair_first", "contacts.reach"),
     "thermal motion": ("thermal.energy",),
 }  # fmt: skip
+DECORATORS = ("compiled", "compiled_lean", "compiled_inline", "compiled_within")
 
 
 class Striking(ast.NodeTransformer):
@@ -75,7 +75,12 @@ class Striking(ast.NodeTransformer):
         return self._without(node, ast.unparse(node.iter))
 
     def visit_If(self, node: ast.If) -> Any:
-        return self._without(node, ast.unparse(node.test))
+        test = ast.unparse(node.test)  # that there is no heat is asked where there is none, and stays
+        return self._without(node, "" if "thermal.energy" in test else test)
+
+    def visit_IfExp(self, node: ast.IfExp) -> Any:
+        """Leave what stands where nothing is asked for."""
+        return node.body if isinstance(self._without(node, ast.unparse(node.orelse)), ast.Pass) else node
 
 
 def without(module: Any, gone: Sequence[str], others: dict[str, Any]) -> tuple[dict[str, Any], int]:
@@ -84,9 +89,10 @@ def without(module: Any, gone: Sequence[str], others: dict[str, Any]) -> tuple[d
     tree = ast.parse(inspect.getsource(module))
     tree.body = [node for node in tree.body if not _imports(node, others)]
     for function in tree.body:
-        if isinstance(function, ast.FunctionDef) and function.name != "attach":  # its loops stay
+        if isinstance(function, ast.FunctionDef):
             striking.visit(function)
-    space: dict[str, Any] = {**others, "__name__": f"{module.__name__}_bare", "compiled": plainly}
+    space: dict[str, Any] = {**others, "__name__": f"{module.__name__}_bare", **dict.fromkeys(DECORATORS, plainly)}
+    space |= {"compiled": counting, "compiled_within": within}
     exec(compile(ast.fix_missing_locations(tree), f"<{module.__name__}, bare>", "exec"), space)
     return space, striking.struck
 
@@ -94,18 +100,28 @@ def without(module: Any, gone: Sequence[str], others: dict[str, Any]) -> tuple[d
 def _imports(node: ast.stmt, others: dict[str, Any]) -> bool:
     """Tell whether a statement imports something that has been replaced, or the decorator."""
     names = {alias.name for alias in node.names} if isinstance(node, ast.ImportFrom) else set()
-    return bool(names & (set(others) | {"compiled"}))
+    return bool(names & {*others, *DECORATORS})
 
 
 def plainly(function: Any) -> Any:
     """Compile as the core does, but keep nothing on disk."""
+    return numba.njit(error_model="numpy", nogil=True, _nrt=False)(function)  # type: ignore[call-overload]
+
+
+def counting(function: Any) -> Any:
+    """Do so for what makes arrays."""
     return numba.njit(error_model="numpy", nogil=True)(function)
+
+
+def within(function: Any) -> Any:
+    """Make it part of what calls it."""
+    return numba.njit(error_model="numpy", inline="always")(function)
 
 
 def bare_burst(gone: Sequence[str]) -> Any:
     """Give a burst that never knew what is gone."""
     moving_names, in_moving = without(moving, gone, {})
-    own = {name: moving_names[name] for name in ("DONE", "TOO_LONG", "advance", "attach", "refresh_turns")}
+    own = {name: moving_names[name] for name in ("advance", "commit", "refresh_turns", "step_explicitly")}
     burst_names, in_burst = without(burst, gone, own)
     assert in_moving + in_burst >= len(gone), f"not all of {gone} was found"
     return burst_names["burst"]
@@ -120,21 +136,24 @@ def prepared(text: str, sub_steps: int) -> Any:
     coupling = machine.coupler.at(configuration, state.mean_loads, None)
     pairs = assembly.near_pairs(problem, state.centres, np.inf)
     moves = pace.pair_moves(problem, pairs, state.centres, machine.pace.share)
-    limits = pace.limits(problem, machine.pace, moves, state.centres, state.wall_gaps, 1.0)
-    never = np.full(len(pairs), np.inf)
-    limits = limits._replace(sub_step=1e-6, most=sub_steps, pair_move=never)
-    system = assembly.system(problem, machine.fixed, state, coupling, 0.0)
-    bound = np.zeros(len(machine.fixed.molecules.kind), np.uint8)
+    stride = pace.Stride(grains=1, sub_steps=sub_steps)
+    limits = pace.limits(problem, machine.pace, moves, state.centres, state.wall_gaps, stride)
+    limits = limits._replace(sub_step=1e-6, pair_move=np.full(len(pairs), np.inf))
+    system = assembly.system(problem, machine.fixed, state, coupling, 0.0, machine.rasters.at(state.centres))
 
     def once(kernel: Any) -> tuple[float, Any]:
-        motion, bonds = assembly.motion_of(state), assembly.bond_room(state.bonds, 64)
-        events: Any = np.zeros(64, march.BOND_EVENT)
-        count = np.zeros(1, np.int64)
+        cells = len(state.wall_gaps)
+        room = assembly.room_for(machine.fixed, state.bonds, cells, system.neighbours)
+        course = Course(
+            system, limits, Dice(machine.fixed.key, 0, 1), assembly.motion_of(state), np.empty((cells, 3, 3)),
+            room.bonds, room.bound, room.candidates, assembly.clocks_of(state), np.zeros((cells, 2)),
+            assembly.progress_of(len(coupling.groups), cells), assembly.trail_for(cells, sub_steps), room.events,
+        )  # fmt: skip
         began = time.thread_time()
-        _, done, _ = kernel(system, bonds, bound, motion, limits, Dice(machine.fixed.key, 0), events, count)
+        kernel(course)
         taken = time.thread_time() - began
-        assert done == sub_steps, done
-        return taken / sub_steps, motion
+        assert course.progress.beats[0] == sub_steps, course.progress
+        return taken / sub_steps, course.motion
 
     return once
 
@@ -144,9 +163,10 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     asked.add_argument("--repeats", type=int, default=31)
     asked.add_argument("--sub-steps", type=int, default=2000)
+    asked.add_argument("what", nargs="*", default=["everything"], help=f"of {', '.join(STRUCK)}; each takes minutes")
     given = asked.parse_args()
     kernels = {"nothing (the same, compiled anew)": bare_burst(())}
-    kernels |= {name: bare_burst(gone) for name, gone in STRUCK.items()}
+    kernels |= {name: bare_burst(STRUCK[name]) for name in given.what}
     for cells, text in ((1, SCENE), (2, SCENE + SECOND)):
         once = prepared(text, given.sub_steps)
         whole = once(burst.burst)[1]
