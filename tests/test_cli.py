@@ -23,7 +23,7 @@ RECRUITMENT = ROOT / "examples" / "recruitment.toml"
 SHORT = ("--set", 'stop.time="2 ms"', "--set", 'cells.roller.start.rolling_alone="5 ms"')
 LONG = ("--set", 'stop.time="100 s"', "--set", "stop.when=[]", "--set", 'cells.roller.start.rolling_alone="5 ms"')
 
-MIDDLING = ("--set", 'stop.time="150 ms"', "--set", "stop.when=[]", "--set", 'cells.roller.start.rolling_alone="20 ms"')
+MIDDLING = ("--set", 'stop.time="1 s"', "--set", "stop.when=[]", "--set", 'cells.roller.start.rolling_alone="20 ms"')
 
 
 def command(*words, **options):

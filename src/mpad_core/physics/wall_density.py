@@ -194,5 +194,6 @@ def _sample(now: Densities, species: BondSpecies, cell: int, kind: int, first: I
     """Sample one window."""
     size, at = now.size[cell, kind], now.start[cell, kind]
     x, y = ((k + np.arange(size) + 0.5) * now.spacing[kind] for k in first)
-    now.value[at : at + size * size] = ratios(species, x[:, None], y[None, :]).ravel()
+    places = np.broadcast_arrays(x[:, None], y[None, :])  # laws need not know how shapes of two arrays combine
+    now.value[at : at + size * size] = ratios(species, *(place.ravel() for place in places))
     now.first_i[cell, kind], now.first_j[cell, kind] = first

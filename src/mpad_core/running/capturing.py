@@ -8,11 +8,13 @@ from mpad_core.physics.coupling import lone_velocity
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State
 
+_SHORTEST = 1e-3  # s, of a while
+
 
 def with_captures(problem: Problem, state: State) -> State:
     """Keep account of it over the outer step that ends in a state, whose memory of captures is still that of its start.
 
-    Breaks are taken from the events, so none is missed; whether a while is over is asked at the ends of outer steps.
+    Breaks are taken from the events, places from the way, so that nothing depends on how long outer steps are.
     """
     bound = state.bond_counts() > 0
     since = np.where(bound, np.minimum(state.bound_since, state.time), np.inf)
@@ -20,13 +22,16 @@ def with_captures(problem: Problem, state: State) -> State:
     caught = np.where(bound, state.caught_since, np.inf)
     for i, time in _unbroken_since(state).items():
         since[i], at[i], caught[i] = time, _place(state, i, time), np.inf
-    for k in np.flatnonzero(bound & (state.time - since >= problem.caught.bound_for)):
+    for k in np.flatnonzero(bound):
         i = int(k)
-        speed = abs(state.centres[i, 0] - at[i]) / max(state.time - since[i], 1e-300)
         place = float(problem.radii[i]), float(state.centres[i, 2]), float(state.wall_gaps[i])
-        if speed < problem.caught.slower_than * lone_velocity(problem.setting, *place):
-            caught[i] = min(caught[i], state.time)
-        since[i], at[i] = state.time, state.centres[i, 0]  # a new while begins
+        slow = problem.caught.slower_than * lone_velocity(problem.setting, *place)
+        while state.time - since[i] >= max(problem.caught.bound_for, _SHORTEST):
+            end = since[i] + max(problem.caught.bound_for, _SHORTEST)
+            x = _place(state, i, end)
+            if abs(x - at[i]) < slow * (end - since[i]):
+                caught[i] = min(caught[i], end)
+            since[i], at[i] = end, x  # a new while begins
     return evolve(state, bound_since=since, bound_at=at, caught_since=caught)
 
 
