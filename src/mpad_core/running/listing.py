@@ -21,6 +21,7 @@ from mpad_core.running.facing import (
     list_facing,
     nearer,
     note_first,
+    shell_of,
 )
 from mpad_core.running.layout import Candidates, Dice, Motion, System, Work
 from mpad_core.running.places import SQUARE, height_of, ligand_at, ligands_of, place_of
@@ -51,7 +52,7 @@ def _nearer(cell: int, level: int, centre: Array, rotation: Array, system: Syste
     drop = max(listed.centre[cell, level, 2] - centre[cell, 2], 0.0)
     nearer = drop + math.sqrt(tx * tx + ty * ty) * lever
     if level != NEAR and system.species.pairwise.any():
-        shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
+        shell = shell_of(cell, system)
         slip_x = centre[cell, 0] - listed.centre[cell, level, 0] - shell * ty
         slip_y = centre[cell, 1] - listed.centre[cell, level, 1] + shell * tx
         nearer += math.sqrt(slip_x * slip_x + slip_y * slip_y) + abs(tz) * lever
@@ -63,7 +64,7 @@ def _mark(
     cell: int, level: int, slack: float, highest: float, system: System, motion: Motion, listed: Candidates
 ) -> None:
     """Note where a cell was when its molecules below a height were listed, and how much nearer others may come."""
-    shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
+    shell = shell_of(cell, system)
     depth = min(max(highest - motion.centre[cell, 2] + shell, 0.0), shell)
     listed.lever[cell, level] = min(math.sqrt(depth * (2 * shell - depth)) + slack, shell)
     listed.slack[cell, level] = slack
@@ -75,14 +76,14 @@ def _mark(
 @compiled_lean
 def _mark_first(cell: int, level: int, lowest: float, system: System, motion: Motion, listed: Candidates) -> None:
     """Note from where a cell's candidates are listed, or would be, and how long they stand."""
-    bottom = motion.centre[cell, 2] - system.bodies.radius[cell] - system.bodies.roughness[cell]
+    bottom = motion.centre[cell, 2] - shell_of(cell, system)
     _mark(cell, level, max(MARGIN, bottom - lowest), lowest + MARGIN, system, motion, listed)
 
 
 @compiled_lean
 def _list_near(cell: int, lowest: float, system: System, motion: Motion, turn: Array, listed: Candidates) -> None:
     """List a cell's molecules that are within reach of the wall or `NEAR_MARGIN` more."""
-    shell = system.bodies.radius[cell] + system.bodies.roughness[cell]
+    shell = shell_of(cell, system)
     bottom = motion.centre[cell, 2] - shell
     highest = lowest + NEAR_MARGIN
     _mark(cell, NEAR, max(NEAR_MARGIN, bottom - lowest) - MARGIN, highest, system, motion, listed)
