@@ -2,7 +2,7 @@
 
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from mpad_core.interfaces.values import Array, Configuration, Motion, Setting, SolverTraits
+from mpad_core.interfaces.values import Array, Configuration, Motion, Rung, Setting, SolverTraits
 
 
 @runtime_checkable
@@ -100,4 +100,15 @@ class FluidVelocity(Protocol):
 
     def flow(self, prepared: Any, motion: Motion, points: Array) -> Array:
         """Give the fluid's velocity (n, 3) at points (n, 3)."""
+        ...
+
+
+@runtime_checkable
+class Laddered(Protocol):
+    """A solver that stands for several: a run begins on the first rung and climbs where its error asks for it."""
+
+    accuracy: float  # the error that is asked for
+
+    def rungs(self) -> tuple[Rung, ...]:
+        """Give the solvers it stands for, from the cheapest that should do to the most exact."""
         ...

@@ -15,6 +15,7 @@ __all__ = [
     "Configuration",
     "Motion",
     "Report",
+    "Rung",
     "Setting",
     "SolverTraits",
 ]
@@ -122,3 +123,15 @@ class SolverTraits:
     lubrication: bool = False  # exact near-contact forces between cells
     largest_number: int | None = None
     levels: tuple[AccuracyLevel, ...] = ()
+
+
+@frozen(kw_only=True)
+class Rung:
+    """One solver of those that another stands for.
+
+    ``trust`` is what its reported errors are multiplied with to be the true ones, as measured.
+    """
+
+    label: str
+    solver: Any  # a MobilitySolver
+    trust: float = 1.0

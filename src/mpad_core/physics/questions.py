@@ -150,6 +150,27 @@ def constrained_motion(solver: MobilitySolver, prepared: Any, loads: Array, held
     """
     if len(held) == 0:
         return asking.solve(solver, prepared, loads)
+    answer, columns, constraint = _constrained(solver, prepared, loads, held, unit)
+    velocity = answer.velocity[..., -1] + columns @ constraint
+    velocity[held] = 0.0
+    return evolve(answer, velocity=velocity)
+
+
+def held_loads(solver: MobilitySolver, prepared: Any, loads: Array, held: Indices, unit: Array) -> Array:
+    """Give the loads (N, 6) with those on held spheres that keep them at rest; the rest as `constrained_motion`."""
+    constraint = _constrained(solver, prepared, loads, held, unit)[2]
+    whole = loads.copy()
+    whole[held] = constraint.reshape(-1, 6) * unit
+    return whole
+
+
+def _constrained(
+    solver: MobilitySolver, prepared: Any, loads: Array, held: Indices, unit: Array
+) -> tuple[Motion, Array, Array]:
+    """Ask for the motion under unit loads on held spheres (N, 6, 6m) and under the others' loads; balance the two.
+
+    The last column of what was asked is the motion with the held spheres free of loads.
+    """
     n, m = len(loads), 6 * len(held)
     block = np.zeros((n, 6, m + 1))
     block[..., :] = loads[..., None]
@@ -159,10 +180,8 @@ def constrained_motion(solver: MobilitySolver, prepared: Any, loads: Array, held
     answer = asking.solve(solver, prepared, block)
     bare = answer.velocity[..., -1]
     columns = answer.velocity[..., :-1] - bare[..., None]
-    constraint = np.linalg.solve(columns[held].reshape(m, m), -bare[held].ravel())
-    velocity = bare + columns @ constraint
-    velocity[held] = 0.0
-    return evolve(answer, velocity=velocity)
+    constraint: Array = np.linalg.solve(columns[held].reshape(m, m), -bare[held].ravel())
+    return answer, columns, constraint
 
 
 def velocities(

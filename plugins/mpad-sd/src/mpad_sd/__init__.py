@@ -36,7 +36,13 @@ class StokesianDynamics:
     """
 
     name: ClassVar[str] = "sd"
-    traits: ClassVar[SolverTraits] = SolverTraits(lubrication=True, levels=(AccuracyLevel(parameters=(), error=2e-2),))
+    traits: ClassVar[SolverTraits] = SolverTraits(
+        lubrication=True,
+        levels=(
+            AccuracyLevel(parameters=(("reach", 8.0),), error=2e-2),
+            AccuracyLevel(parameters=(("reach", 1.5),), error=3e-2),
+        ),
+    )
 
     tolerance: float = field(default=1e-6, validator=[validators.ge(1e-12), validators.le(1e-2)])
     reach: float = field(default=8.0, validator=[validators.ge(1.0), validators.le(100.0)])

@@ -1,0 +1,107 @@
+"""The installed solvers, each at every level of its accuracy; how wrong and how sure of itself one is somewhere."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from attrs import evolve, frozen
+
+from mpad_core.arrays import Array, Indices
+from mpad_core.interfaces.errors import InputError
+from mpad_core.interfaces.mobility import Laddered, MobilitySolver
+from mpad_core.interfaces.values import Configuration, Motion, Setting
+from mpad_core.physics import asking
+from mpad_core.physics.questions import held_loads, unit_load
+from mpad_core.plugins import registry
+
+
+@frozen(kw_only=True)
+class Level:
+    """A solver at one level of its accuracy."""
+
+    name: str  # of the part
+    parameters: tuple[tuple[str, object], ...]
+    claim: float  # the error it claims
+    solver: MobilitySolver
+
+    @property
+    def label(self) -> str:
+        """Give the solver and what sets the level, as ``cdl-biem accuracy=0.01``."""
+        return " ".join([self.name, *(f"{key}={value}" for key, value in self.parameters)])
+
+
+def installed_levels(names: Sequence[str] | None = None) -> tuple[Level, ...]:
+    """Give every level of the installed solvers (or of those named), the coarsest claim first.
+
+    A solver that states no level counts once, with its defaults and without a claim (infinity). Solvers that stand for
+    others (`Laddered`) are left out.
+
+    Raises
+    ------
+    InputError, PartError
+        If a name is not installed, or a part fails to load.
+    """
+    found = []
+    for name in [part.name for part in registry.installed("solver")] if names is None else names:
+        made = registry.load("solver", name)
+        levels = [(level.parameters, level.error) for level in made.traits.levels] or [((), np.inf)]
+        if not isinstance(made(), Laddered):
+            found += [Level(name=name, parameters=p, claim=e, solver=made(**dict(p))) for p, e in levels]
+    return tuple(sorted(found, key=lambda level: -level.claim))
+
+
+def level_named(label: str) -> Level:
+    """Find an installed level by its label.
+
+    Raises
+    ------
+    InputError
+        If none is called so.
+    """
+    name = label.partition(" ")[0]
+    known = installed_levels([name])
+    for level in known:
+        if level.label == label:
+            return level
+    raise InputError(f"no level {label!r} is installed (there are: {', '.join(level.label for level in known)})")
+
+
+@frozen(kw_only=True, eq=False)
+class Situation:
+    """Where the spheres are and what pushes them: one right-hand side."""
+
+    configuration: Configuration
+    loads: Array  # (N, 6) pN, pN µm; those on held spheres do not matter
+    held: Indices  # spheres whose velocity is zero
+
+    def part(self, cells: Indices) -> "Situation":
+        """Give the situation of some of the spheres."""
+        held = np.flatnonzero(np.isin(cells, self.held))
+        return evolve(self, configuration=self.configuration.part(cells), loads=self.loads[cells], held=held)
+
+
+def answer(solver: MobilitySolver, plan: Any, setting: Setting, situation: Situation, speed: float) -> Motion:
+    """Give the motion in a situation, whose report is of this very right-hand side, the loads on held spheres included.
+
+    Parameters
+    ----------
+    speed
+        Typical of the problem (µm/s); unit loads on held spheres are such as to give about this.
+    """
+    at, held, loads = situation.configuration, situation.held, situation.loads
+    prepared = asking.prepare(solver, plan, at)
+    if len(held):
+        unit = unit_load(setting.viscosity, float(at.radii.max()), speed)
+        loads = held_loads(solver, prepared, loads, held, unit)
+    motion = asking.solve(solver, prepared, loads)
+    motion.velocity[held] = 0.0
+    return motion
+
+
+def relative_error(found: Array, expected: Array, radii: Array) -> float:
+    """Give the relative 2-norm error of (U, aΩ): "the error" everywhere; absolute where nothing should move."""
+    weights = np.ones((len(radii), 6))
+    weights[:, 3:] = radii[:, None]
+    size = np.linalg.norm(weights * expected)
+    wrong = np.linalg.norm(weights * (found - expected))
+    return float(wrong / size) if size > 0 else float(wrong)

@@ -1,0 +1,59 @@
+"""Situations that a problem's own run comes through: where solvers are tried for it."""
+
+from collections.abc import Iterator
+from itertools import islice
+
+import numpy as np
+
+from mpad_core.interfaces.errors import RefusedError
+from mpad_core.physics.levels import Situation
+from mpad_core.physics.problem import Problem
+from mpad_core.physics.state import State
+from mpad_core.running.initial import initial_state
+from mpad_core.running.march import Machine, configuration_of, march
+
+
+def situation_of(problem: Problem, state: State) -> Situation:
+    """Give where the cells are, and the loads that the last outer step had in the mean."""
+    held = np.flatnonzero(problem.held)
+    return Situation(configuration=configuration_of(problem, state), loads=state.mean_loads, held=held)
+
+
+def situations(machine: Machine, until: float, number: int, most_steps: int | None = None) -> list[Situation]:
+    """March, and give situations spread evenly over the outer steps, the one of the closest pair among them.
+
+    Parameters
+    ----------
+    machine
+        A problem made ready.
+    until
+        Time (s) to march to at most.
+    number
+        Of situations to be chosen, at least 2.
+    most_steps
+        Outer steps to take at most.
+
+    Returns
+    -------
+    list
+        In the order of time, the start first. Fewer than asked for where there were fewer outer steps. A march that is
+        refused ends where it was.
+    """
+    seen = [situation_of(machine.problem, state) for state in islice(_as_far_as_it_goes(machine, until), most_steps)]
+    chosen = set(np.linspace(0, len(seen) - 1, number - 1).round().astype(int).tolist())
+    return [seen[k] for k in sorted(chosen | {int(np.argmin([_closest(one) for one in seen]))})]
+
+
+def _as_far_as_it_goes(machine: Machine, until: float) -> Iterator[State]:
+    try:
+        yield from march(machine, initial_state(machine), until)
+    except RefusedError:
+        return
+
+
+def _closest(situation: Situation) -> float:
+    """Give the smallest gap between two cells (µm); infinity with one cell."""
+    at = situation.configuration
+    i, j = np.triu_indices(len(at.radii), 1)
+    gaps = np.linalg.norm(at.centres[i] - at.centres[j], axis=1) - at.radii[i] - at.radii[j]
+    return float(gaps.min()) if len(gaps) else np.inf
