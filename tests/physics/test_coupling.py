@@ -9,7 +9,8 @@ from attrs import evolve
 from mpad_core.interfaces.errors import PartError, RefusedError
 from mpad_core.interfaces.values import Configuration, Motion, Report, Setting, SolverTraits
 from mpad_core.physics import coupling
-from mpad_core.physics.coupling import coupler, free_motion, group_cells, lone_cell, typical_speed
+from mpad_core.physics.couplers import coupler
+from mpad_core.physics.coupling import free_motion, group_cells, lone_cell, typical_speed
 from mpad_core.physics.questions import constrained_motion, mobility_matrix, unit_load, velocities
 
 CENTRES = [[0, 0, 5.3], [10.8, 1, 6.0], [-3, 12, 7.5], [2, 1, 17.5]]
@@ -182,7 +183,9 @@ def test_groups_by_gap_and_by_touch(problem: Any) -> None:
 def test_free_motion_keeps_the_digits_of_both(problem: Any) -> None:
     asked = problem(CENTRES)
     plan = asked.solver.plan(asked.setting)
-    mobility, free, _ = free_motion(asked.solver, plan, asked.setting, at(asked), typical_speed(asked))
+    mobility, free, _ = free_motion(
+        asked.solver, asked.solver.prepare(plan, at(asked)), asked.setting, asked.radii, typical_speed(asked)
+    )
     expected = mobility_matrix(asked.solver, CENTRES, 5.0, viscosity=VISCOSITY)
     scale = np.sqrt(np.diag(expected))
     assert (np.abs(mobility - expected) / np.outer(scale, scale)).max() < 1e-10
@@ -220,9 +223,8 @@ def test_a_mobility_that_is_not_definite_is_refused_by_name(problem: Any) -> Non
 def test_a_mobility_that_is_not_symmetric_is_a_fault_of_the_part() -> None:
     matrix = np.eye(6)
     matrix[0, 4] = 0.5
-    where = Configuration(centres=[[0, 0, 6.0]], radii=[5.0])
     with pytest.raises(PartError, match="broken"):
-        free_motion(Broken(matrix), None, Setting(viscosity=1.0), where, 1.0)
+        free_motion(Broken(matrix), None, Setting(viscosity=1.0), np.array([5.0]), 1.0)
 
 
 def test_constrained_motion_ignores_loads_on_held_cells(problem: Any) -> None:

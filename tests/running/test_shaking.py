@@ -11,7 +11,7 @@ from mpad_core import mobility_matrix
 from mpad_core.numerics.streams import key_of
 from mpad_core.numerics.wall_functions import wall_drift
 from mpad_core.physics import fluctuations
-from mpad_core.physics.coupling import NoDrift
+from mpad_core.physics.couplers import NoDrift
 from mpad_core.physics.state import from_arrays, to_arrays
 from mpad_core.running import assembly
 from mpad_core.running.march import configuration_of

@@ -37,6 +37,8 @@ class Coupling:
     matrices: tuple[Array, ...]  # (6n, 6n) each: C
     loads: Array  # (N, 6): k + g
     guess: Array | None = None
+    error: float = 0.0  # that the solver reports of the motion under the mean loads; 0 where nobody watches it
+    level: int = 0  # the rung that gave it, where the solver stands for several
 
 
 class Coupler(Protocol):
@@ -47,8 +49,11 @@ class Coupler(Protocol):
         """The solver's plan, or None."""
         ...
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
-        """Give the coupling there; `mean_loads` (N, 6) are those under which distant cells are felt."""
+    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None, level: int = 0) -> Coupling:
+        """Give the coupling there; `mean_loads` (N, 6) are those under which distant cells are felt.
+
+        `level` is the lowest rung to ask, where the solver stands for several.
+        """
         ...
 
 
@@ -68,19 +73,18 @@ def lone_velocity(setting: Setting, radius: float, height: float, gap: float) ->
 
 
 def free_motion(
-    solver: MobilitySolver, plan: Any, setting: Setting, configuration: Configuration, speed: float,
-    guess: Array | None = None,
-) -> tuple[Array, Array, Array | None]:  # fmt: skip
+    solver: MobilitySolver, prepared: Any, setting: Setting, radii: Array, speed: float
+) -> tuple[Array, Array, Array | None]:
     """Ask a solver for mobility (6n, 6n), symmetrised, and free velocities (6n,), in one block of solves; and a guess.
 
     Loads are such as give velocities of about `speed` (µm/s), so that taking the free velocities away again loses no
     digits.
     """
-    n = len(configuration.radii)
-    size = np.tile(unit_load(setting.viscosity, float(configuration.radii.max()), speed), n)
+    n = len(radii)
+    size = np.tile(unit_load(setting.viscosity, float(radii.max()), speed), n)
     loads = np.zeros((6 * n, 6 * n + 1))
     loads[:, :-1] = np.diag(size)
-    motion = asking.solve(solver, asking.prepare(solver, plan, configuration, guess), loads.reshape(n, 6, 6 * n + 1))
+    motion = asking.solve(solver, prepared, loads.reshape(n, 6, 6 * n + 1))
     answer = motion.velocity.reshape(6 * n, 6 * n + 1)
     mobility = (answer[:, :-1] - answer[:, -1:]) / size
     size_of = np.sqrt(np.abs(np.diag(mobility)))
@@ -97,7 +101,7 @@ class NoCoupling:
     touching: float  # µm, smooth gap below which cells may be in contact, and so must be solved together
     plan: Any = None
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
+    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None, level: int = 0) -> Coupling:
         """Give zero; free cells share a group only where they may touch."""
         groups = linked(configuration, np.flatnonzero(~self.problem.held), self.touching)
         matrices = tuple(np.zeros((6 * len(group), 6 * len(group))) for group in groups)
@@ -155,8 +159,9 @@ class SolverCoupling:
     plan: Any
     speed: float  # µm/s, typical of the problem
     touching: float  # µm, smooth gap below which cells may be in contact
+    watched: bool = False  # whether to ask for the error of the motion under the mean loads
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
+    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None, level: int = 0) -> Coupling:
         """Solve each group with the held cells; account for all that lies outside by one full solve.
 
         Raises
@@ -168,15 +173,19 @@ class SolverCoupling:
         held = np.flatnonzero(problem.held)
         groups = group_cells(configuration, problem.held, self.touching)
         loads = np.zeros((len(problem.radii), 6))
-        matrices = []
+        matrices, error = [], 0.0
         few = len(problem.radii) - len(held) <= LARGEST_GROUP  # then the guess is of the one group's block
         for group in groups:
             members = np.concatenate([group, held])
             if len(members) == 1 and len(groups) > 1:  # alone it is as the wall functions have it; g holds the others
                 matrices.append(np.zeros((6, 6)))
                 continue
-            resistance, free, found = self._resistance(configuration.part(members), members, guess if few else None)
+            prepared = self._prepared(configuration.part(members), guess if few else None)
+            mobility, free, found = self._free_motion(prepared, configuration.radii[members])
+            resistance = self._inverse(mobility, members)
             guess = found if few else guess
+            if self.watched and len(groups) == 1:
+                error = self._error(prepared, mobility, free, mean_loads[members], len(group))
             own = 6 * len(group)
             for place, cell in enumerate(group):
                 lone, ambient = self._lone(configuration, cell)
@@ -185,34 +194,44 @@ class SolverCoupling:
                 resistance[o : o + 6, o : o + 6] -= lone
             matrices.append(np.ascontiguousarray(resistance[:own, :own]))
         if len(groups) > 1:
-            guess = self._add_outside(configuration, groups, matrices, loads, mean_loads, guess)
-        return Coupling(groups=groups, matrices=tuple(matrices), loads=loads, guess=guess)
+            guess, error = self._add_outside(configuration, groups, matrices, loads, mean_loads, guess)
+        return Coupling(groups=groups, matrices=tuple(matrices), loads=loads, guess=guess, error=error)
 
     def _lone(self, configuration: Configuration, cell: int) -> tuple[Array, Array]:
         height = float(configuration.centres[cell, 2])
         gap = float(configuration.wall_gaps[cell])
         return lone_cell(self.problem.setting, float(configuration.radii[cell]), height, gap)
 
-    def _resistance(
-        self, configuration: Configuration, members: Indices, guess: Array | None
-    ) -> tuple[Array, Array, Array | None]:
-        solver, setting = self.problem.solver, self.problem.setting
-        mobility, free, found = free_motion(solver, self.plan, setting, configuration, self.speed, guess)
+    def _prepared(self, configuration: Configuration, guess: Array | None) -> Any:
+        return asking.prepare(self.problem.solver, self.plan, configuration, guess)
+
+    def _free_motion(self, prepared: Any, radii: Array) -> tuple[Array, Array, Array | None]:
+        return free_motion(self.problem.solver, prepared, self.problem.setting, radii, self.speed)
+
+    def _inverse(self, mobility: Array, members: Indices) -> Array:
         try:
             resistance = cho_solve(cho_factor(mobility), np.eye(len(mobility)))
         except (np.linalg.LinAlgError, ValueError) as error:
             names = ", ".join(self.problem.names[i] for i in members)
             raise RefusedError(
-                f"solver {solver.name!r}: mobility of {names} is not positive definite ({error})"
+                f"solver {self.problem.solver.name!r}: mobility of {names} is not positive definite ({error})"
             ) from error
-        return 0.5 * (resistance + resistance.T), free, found
+        return np.asarray(0.5 * (resistance + resistance.T))
+
+    def _error(self, prepared: Any, mobility: Array, free: Array, loads: Array, own: int) -> float:
+        """Give the error that the solver reports of the motion under loads (n, 6); those from `own` on are held."""
+        loads, m = loads.copy(), 6 * own
+        if own < len(loads):
+            passed = free[m:] + mobility[m:, :m] @ loads[:own].ravel()
+            loads[own:] = np.linalg.solve(mobility[m:, m:], -passed).reshape(-1, 6)
+        return asking.solve(self.problem.solver, prepared, loads).report.error
 
     def _add_outside(
         self, configuration: Configuration, groups: tuple[Indices, ...], matrices: list[Array], loads: Array,
         mean_loads: Array, guess: Array | None,
-    ) -> Array | None:  # fmt: skip
-        """Add g to the loads of every group; give the solver's next guess."""
-        prepared = asking.prepare(self.problem.solver, self.plan, configuration, guess)
+    ) -> tuple[Array | None, float]:  # fmt: skip
+        """Add g to the loads of every group; give the solver's next guess, and the error it reports."""
+        prepared = self._prepared(configuration, guess)
         held = np.flatnonzero(self.problem.held)
         unit = unit_load(self.problem.setting.viscosity, float(configuration.radii.max()), self.speed)
         motion = constrained_motion(self.problem.solver, prepared, mean_loads, held, unit)
@@ -222,32 +241,7 @@ class SolverCoupling:
                 lone, ambient = self._lone(configuration, cell)
                 wanted = lone @ motion.velocity[cell] + coupled[place]
                 loads[cell] = wanted - mean_loads[cell] - ambient
-        return motion.guess
-
-
-class Drift(Protocol):
-    """Adds to a coupling what thermal motion asks of it."""
-
-    def added(self, coupling: Coupling, configuration: Configuration, step: int) -> Coupling:
-        """Give the coupling with further loads; `step` is the sub-step's number, by which draws are keyed."""
-        ...
-
-
-class NoDrift:
-    """The null object: no thermal motion, or a coupling that does not change."""
-
-    def added(self, coupling: Coupling, configuration: Configuration, step: int) -> Coupling:
-        """Give the coupling as it is."""
-        return coupling
-
-
-def drift_of(problem: Problem, coupling: Coupler) -> Drift:
-    """Give the drift that a coupling misses while it is frozen."""
-    if problem.thermal_energy == 0 or not isinstance(coupling, SolverCoupling):
-        return NoDrift()
-    from mpad_core.physics.fluctuations import CouplingDrift
-
-    return CouplingDrift(problem=problem, coupling=coupling)
+        return motion.guess, motion.report.error
 
 
 def contact_reach(problem: Problem) -> float:
@@ -261,17 +255,6 @@ def contact_reach(problem: Problem) -> float:
 def contact_range(problem: Problem) -> float:
     """Give the smooth gap (µm) below which two cells may come to repel each other within a burst."""
     return _ROOM_TO_MOVE * contact_reach(problem)
-
-
-def coupler(problem: Problem, plan: Any = None) -> Coupler:
-    """Give the coupler of a problem; the solver's plan is made here, once a run, unless there is one already."""
-    touching = contact_range(problem)
-    if not problem.coupled:
-        return NoCoupling(problem=problem, touching=touching)
-    if plan is None:
-        with asking.blamed(f"solver {problem.solver.name!r}"):
-            plan = problem.solver.plan(problem.setting)
-    return SolverCoupling(problem=problem, plan=plan, speed=typical_speed(problem), touching=touching)
 
 
 def typical_speed(problem: Problem) -> float:

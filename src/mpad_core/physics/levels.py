@@ -79,6 +79,16 @@ class Situation:
         held = np.flatnonzero(np.isin(cells, self.held))
         return evolve(self, configuration=self.configuration.part(cells), loads=self.loads[cells], held=held)
 
+    def closest(self) -> tuple[float, Indices]:
+        """Give the smallest gap between two spheres (µm), and which they are; infinity and all with fewer."""
+        at = self.configuration
+        i, j = np.triu_indices(len(at.radii), 1)
+        if not len(i):
+            return np.inf, np.arange(len(at.radii))
+        gaps = np.linalg.norm(at.centres[i] - at.centres[j], axis=1) - at.radii[i] - at.radii[j]
+        k = int(np.argmin(gaps))
+        return float(gaps[k]), np.array([i[k], j[k]])
+
 
 def answer(solver: MobilitySolver, plan: Any, setting: Setting, situation: Situation, speed: float) -> Motion:
     """Give the motion in a situation, whose report is of this very right-hand side, the loads on held spheres included.

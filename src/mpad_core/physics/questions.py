@@ -180,8 +180,7 @@ def _constrained(
     answer = asking.solve(solver, prepared, block)
     bare = answer.velocity[..., -1]
     columns = answer.velocity[..., :-1] - bare[..., None]
-    constraint: Array = np.linalg.solve(columns[held].reshape(m, m), -bare[held].ravel())
-    return answer, columns, constraint
+    return answer, columns, np.asarray(np.linalg.solve(columns[held].reshape(m, m), -bare[held].ravel()))
 
 
 def velocities(

@@ -15,7 +15,8 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.tables import value
-from mpad_core.physics.coupling import Coupler, Coupling, Drift, contact_range, contact_reach, coupler, drift_of, joined
+from mpad_core.physics.couplers import Drift, coupler, drift_of
+from mpad_core.physics.coupling import Coupler, Coupling, contact_range, contact_reach, joined
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, Way
 from mpad_core.physics.wall_density import Rasters, rasters
@@ -102,7 +103,8 @@ def step(machine: Machine, state: State, until: float) -> State:
     moves = pace.pair_moves(problem, _coupled_pairs(machine, state), state.centres, machine.pace.share)
     stride = pace.stride_of(problem, machine.pace, moves, state.drift, until - state.time)
     middle = _ahead(problem, state, 0.5 * stride.sub_steps * stride.grains * machine.pace.grain)
-    coupling = machine.drift.added(machine.coupler.at(middle, state.mean_loads, state.guess), middle, state.step)
+    coupling = machine.coupler.at(middle, state.mean_loads, state.guess, state.level)
+    coupling = machine.drift.added(coupling, middle, state.step)
     bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, stride)
     return _burst(machine, state, joined(coupling, state.bonds.pairs()), bounds, stride.grains)
 
@@ -182,6 +184,7 @@ def _next(machine: Machine, state: State, made: _Done, coupling: Coupling, strid
         clocks=made.clocks.left,
         draws=made.clocks.number.astype(float),
         guess=coupling.guess,
+        level=coupling.level,
         events=_in_order(made.events, state.zero, stride, machine.pace.grain),
         way=_way(state, made, machine.pace.grain),
     )

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from mpad_core.physics.state import State
+from mpad_core.running.choosing import settled
 from mpad_core.running.initial import initial_state
 from mpad_core.running.march import make_ready, march
 from mpad_core.scene.compose import compose
@@ -21,6 +22,6 @@ def states(scene: Scene, *, replicate: int = 0) -> Iterator[State]:
     replicate
         Added to the scene's seed.
     """
-    problem = compose(scene, replicate)
+    problem = compose(settled(scene), replicate)
     machine = make_ready(problem)
     yield from march(machine, initial_state(machine), scene.stop.time)

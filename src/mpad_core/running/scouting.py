@@ -41,7 +41,7 @@ def situations(machine: Machine, until: float, number: int, most_steps: int | No
     """
     seen = [situation_of(machine.problem, state) for state in islice(_as_far_as_it_goes(machine, until), most_steps)]
     chosen = set(np.linspace(0, len(seen) - 1, number - 1).round().astype(int).tolist())
-    return [seen[k] for k in sorted(chosen | {int(np.argmin([_closest(one) for one in seen]))})]
+    return [seen[k] for k in sorted(chosen | {int(np.argmin([one.closest()[0] for one in seen]))})]
 
 
 def _as_far_as_it_goes(machine: Machine, until: float) -> Iterator[State]:
@@ -49,11 +49,3 @@ def _as_far_as_it_goes(machine: Machine, until: float) -> Iterator[State]:
         yield from march(machine, initial_state(machine), until)
     except RefusedError:
         return
-
-
-def _closest(situation: Situation) -> float:
-    """Give the smallest gap between two cells (µm); infinity with one cell."""
-    at = situation.configuration
-    i, j = np.triu_indices(len(at.radii), 1)
-    gaps = np.linalg.norm(at.centres[i] - at.centres[j], axis=1) - at.radii[i] - at.radii[j]
-    return float(gaps.min()) if len(gaps) else np.inf

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from attrs import evolve
 
+from mpad_core.running.choosing import settled
 from mpad_core.running.initial import initial_state
 from mpad_core.running.march import configuration_of, make_ready, step
 from mpad_core.scene.compose import compose
@@ -16,7 +17,7 @@ _STEPS = 20
 
 def cost_lines(scene: Scene) -> Iterator[str]:
     """Yield what ``mpad check --measure`` adds: the medians over some outer steps, preparations left out."""
-    problem = compose(scene)
+    problem = compose(settled(scene))
     machine = make_ready(evolve(problem, alone_for=np.zeros(len(problem.names))))
     state = step(machine, initial_state(machine), scene.stop.time)  # the first step compiles
     whole, solves, sub_steps = [], [], []

@@ -18,6 +18,7 @@ from mpad_core.records.log import RunLog
 from mpad_core.records.progress import progress
 from mpad_core.records.reader import read_trajectory
 from mpad_core.records.trajectory import Trajectory
+from mpad_core.running.choosing import kept_choice, settled
 from mpad_core.running.recorder import TRAJECTORY, Recording
 from mpad_core.running.run import CHECKPOINT_EVERY, Order, Outcome, run_one
 from mpad_core.running.schedules import Cadence
@@ -100,10 +101,13 @@ def run(
     todo = list(cases(scene))
     _make(root)
     with locked(root):
+        choice = _with_choice(scene, root, resume)
+        if choice is not scene:
+            scene, text, todo = choice, resolved_toml(choice), list(cases(choice))
         _claim(root, scene, text, resume)
         with RunLog(root / LOG) as log:
             began = time.monotonic()
-            log.write("started", scene=scene.title, runs=len(todo), resume=resume)
+            log.write("started", scene=scene.title, runs=len(todo), resume=resume, solver=scene.solver.parameters)
             results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
             summary = _summary(scene, results, time.monotonic() - began)
             _write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
@@ -120,6 +124,13 @@ def _make(root: FilePath) -> None:
         raise InputError(
             f"{root}: no directory can be made there ({error.strerror}); choose another with -o"
         ) from error
+
+
+def _with_choice(scene: Scene, root: FilePath, resume: bool) -> Scene:
+    """Give the scene with the solver that it leaves open: that of the run to be resumed, or a new choice."""
+    if (root / SCENE).exists():
+        return kept_choice(scene, root / SCENE) if resume else scene
+    return settled(scene)
 
 
 def _claim(root: FilePath, scene: Scene, text: str, resume: bool) -> None:

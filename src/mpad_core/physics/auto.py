@@ -1,0 +1,171 @@
+"""The solver that is a choice among those installed.
+
+Light: what the chosen ones need is imported when they plan.
+"""
+
+from typing import Any, ClassVar
+
+import numpy as np
+from attrs import field, frozen, validators
+
+from mpad_core.arrays import Array
+from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.mobility import MobilitySolver
+from mpad_core.interfaces.values import AccuracyLevel, Configuration, Motion, Rung, Setting, SolverTraits
+from mpad_core.physics import asking
+from mpad_core.physics.levels import Level, installed_levels, level_named
+from mpad_core.physics.questions import unit_load
+from mpad_core.plugins.hookspecs import hookimpl
+
+_STEPS_OF_CLAIMS = 1.6  # a rung worth trying claims so many times less than the one before
+
+
+@frozen(kw_only=True)
+class Auto:
+    """The cheapest installed solver that is as exact as asked for.
+
+    A run chooses once, at its start, by trying all solvers on the scene itself, writes its choice into the resolved
+    scene, and climbs to a more exact one where the error reported on the way, times the trust measured in it, no longer
+    meets the request. Asked without a run, it tries the installed levels from the coarsest claim on, until one reports
+    an error that meets the request under the flow, under weights, and without flow under loads that push the spheres
+    together; so one configuration is answered by one solver, whatever the loads.
+
+    Parameters
+    ----------
+    accuracy
+        Largest relative error of the velocities.
+    levels
+        What to choose from, the first to be tried first, each a solver and its level, as ``"cdl-biem accuracy=0.01"``;
+        all that are installed if left out. A run fills it in.
+    trust
+        For each level, the true error over that reported, as measured; 1 if left out.
+    reason
+        Why these, in words; nobody acts on it.
+    """
+
+    name: ClassVar[str] = "auto"
+    traits: ClassVar[SolverTraits] = SolverTraits(
+        lubrication=True,
+        levels=tuple(AccuracyLevel(parameters=(("accuracy", x),), error=x) for x in (1e-2, 1e-3)),
+    )
+
+    accuracy: float = field(default=1e-3, validator=[validators.ge(1e-6), validators.le(0.5)])
+    levels: tuple[str, ...] = ()
+    trust: tuple[float, ...] = field(default=())
+    reason: str = ""
+
+    @trust.validator
+    def _one_for_each_level(self, attribute: object, value: tuple[float, ...]) -> None:
+        if value and (len(value) != len(self.levels) or min(value) <= 0):
+            raise ValueError(
+                f"trust must be one positive number for each of the {len(self.levels)} levels, not {value}"
+            )
+
+    def rungs(self) -> tuple[Rung, ...]:
+        """Give the levels to be tried, in this order.
+
+        Raises
+        ------
+        InputError
+            If one of `levels` is not installed.
+        """
+        chosen = [level_named(label) for label in self.levels] if self.levels else _worth_trying()
+        trusts = self.trust or (1.0,) * len(chosen)
+        return tuple(Rung(label=c.label, solver=c.solver, trust=t) for c, t in zip(chosen, trusts, strict=True))
+
+    def plan(self, setting: Setting) -> Any:
+        """Keep the setting; solvers plan when they are tried."""
+        return _Plan(setting=setting, accuracy=self.accuracy, rungs=self.rungs())
+
+    def prepare(self, plan: Any, configuration: Configuration, guess: Array | None = None) -> Any:
+        """Try one level after the other at a configuration; keep the first that reports an error small enough.
+
+        Raises
+        ------
+        RefusedError
+            If all refuse, with what the last one says.
+        """
+        return plan.prepared(configuration)
+
+    def solve(self, prepared: Any, loads: Array) -> Motion:
+        """Give the chosen solver's answer; its guess is of no use to another, and left out."""
+        motion = prepared.solver.solve(prepared.inner, loads)
+        return Motion(velocity=motion.velocity, report=motion.report)
+
+    def root(self, prepared: Any, noise: Array) -> Array:
+        """Multiply noise with the chosen solver's root of the mobility."""
+        root: Array = prepared.solver.root(prepared.inner, noise)
+        return root
+
+    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
+        """Give the divergence of the chosen solver's mobility."""
+        drift: Array = prepared.solver.drift(prepared.inner, noise)
+        return drift
+
+
+def _worth_trying() -> list[Level]:
+    """Thin out the installed levels, so that each claims clearly less than the one before; the best one stays."""
+    found: list[Level] = []
+    for level in installed_levels():
+        if not found or level.claim * _STEPS_OF_CLAIMS <= found[-1].claim:
+            found.append(level)
+    return found
+
+
+@frozen(kw_only=True, eq=False)
+class _Prepared:
+    """A configuration as the chosen solver has it."""
+
+    solver: Any
+    inner: Any
+
+
+@frozen(kw_only=True, eq=False)
+class _Plan:
+    """What stays the same; plans of solvers are made when needed, and kept."""
+
+    setting: Setting
+    accuracy: float
+    rungs: tuple[Rung, ...]
+    plans: dict[str, Any] = field(factory=dict)
+
+    def prepared(self, at: Configuration) -> _Prepared:
+        loads, refusal = _tried_loads(self.setting, at), RefusedError("no solver is installed")
+        coarser = None
+        for rung in self.rungs:
+            try:
+                inner = asking.prepare(rung.solver, self._plan_of(rung), at)
+                error = rung.trust * asking.solve(rung.solver, inner, loads).report.error
+            except RefusedError as refused:
+                refusal = refused
+                continue
+            coarser = _Prepared(solver=rung.solver, inner=inner)
+            if error <= self.accuracy:
+                return coarser
+        if coarser is None:
+            raise refusal
+        return coarser
+
+    def _plan_of(self, rung: Rung) -> Any:
+        if rung.label not in self.plans:
+            self.plans[rung.label] = rung.solver.plan(self.setting)
+        return self.plans[rung.label]
+
+
+def _tried_loads(setting: Setting, at: Configuration) -> Array:
+    """Give loads (N, 6, 2) that turn and mirror with the spheres: weights, and none or, without flow, a squeeze."""
+    n, radius = len(at.radii), float(at.radii.max())
+    force = unit_load(setting.viscosity, radius, abs(setting.shear_rate) * radius)[0]
+    loads = np.zeros((n, 6, 2))
+    loads[:, 2, 0] = -force * at.radii / radius
+    if setting.shear_rate == 0:
+        between = at.centres[None] - at.centres[:, None]
+        distance = np.linalg.norm(between, axis=2) + np.where(np.eye(n) > 0, np.inf, 0.0)
+        loads[:, :3, 1] = force * np.sum(between * (at.radii[None, :, None] / distance[..., None] ** 2), axis=1)
+    return loads
+
+
+@hookimpl
+def mpad_mobility_solvers() -> list[type[MobilitySolver]]:
+    """Give the solver."""
+    return [Auto]
