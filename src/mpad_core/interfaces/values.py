@@ -127,11 +127,12 @@ class SolverTraits:
 
 @frozen(kw_only=True)
 class Rung:
-    """One solver of those that another stands for.
+    """One solver of those that another stands for, and the error it claims.
 
     ``trust`` is what its reported errors are multiplied with to be the true ones, as measured.
     """
 
     label: str
     solver: Any  # a MobilitySolver
+    claim: float
     trust: float = 1.0

@@ -13,11 +13,12 @@ from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import AccuracyLevel, Configuration, Motion, Rung, Setting, SolverTraits
 from mpad_core.physics import asking
-from mpad_core.physics.levels import Level, installed_levels, level_named
+from mpad_core.physics.levels import Level, installed_levels, level_named, relative_error
 from mpad_core.physics.questions import unit_load
 from mpad_core.plugins.hookspecs import hookimpl
 
-_STEPS_OF_CLAIMS = 1.6  # a rung worth trying claims so many times less than the one before
+_WORTH_TRYING = 1.6  # times less than the rung before is what the next one claims
+_INDEPENDENT = 3.5  # claims so many times apart are of solvers that do not err alike
 
 
 @frozen(kw_only=True)
@@ -25,10 +26,10 @@ class Auto:
     """The cheapest installed solver that is as exact as asked for.
 
     A run chooses once, at its start, by trying all solvers on the scene itself, writes its choice into the resolved
-    scene, and climbs to a more exact one where the error reported on the way, times the trust measured in it, no longer
-    meets the request. Asked without a run, it tries the installed levels from the coarsest claim on, until one reports
-    an error that meets the request under the flow, under weights, and without flow under loads that push the spheres
-    together; so one configuration is answered by one solver, whatever the loads.
+    scene, and climbs to a more exact one where the error on the way no longer meets the request. Asked without a run, it
+    tries the installed levels from the coarsest claim on, until one reports an error that meets the request, or agrees
+    with a coarser one: under weights, and in the flow, or where there is none under loads that push spheres together.
+    So one configuration is answered by one solver, whatever the loads.
 
     Parameters
     ----------
@@ -71,7 +72,10 @@ class Auto:
         """
         chosen = [level_named(label) for label in self.levels] if self.levels else _worth_trying()
         trusts = self.trust or (1.0,) * len(chosen)
-        return tuple(Rung(label=c.label, solver=c.solver, trust=t) for c, t in zip(chosen, trusts, strict=True))
+        return tuple(
+            Rung(label=level.label, solver=level.solver, claim=level.claim, trust=trust)
+            for level, trust in zip(chosen, trusts, strict=True)
+        )
 
     def plan(self, setting: Setting) -> Any:
         """Keep the setting; solvers plan when they are tried."""
@@ -107,7 +111,7 @@ def _worth_trying() -> list[Level]:
     """Thin out the installed levels, so that each claims clearly less than the one before; the best one stays."""
     found: list[Level] = []
     for level in installed_levels():
-        if not found or level.claim * _STEPS_OF_CLAIMS <= found[-1].claim:
+        if not found or level.claim * _WORTH_TRYING <= found[-1].claim:
             found.append(level)
     return found
 
@@ -130,21 +134,28 @@ class _Plan:
     plans: dict[str, Any] = field(factory=dict)
 
     def prepared(self, at: Configuration) -> _Prepared:
-        loads, refusal = _tried_loads(self.setting, at), RefusedError("no solver is installed")
-        coarser = None
+        loads, found, before = _tried_loads(self.setting, at), None, []
         for rung in self.rungs:
             try:
                 inner = asking.prepare(rung.solver, self._plan_of(rung), at)
-                error = rung.trust * asking.solve(rung.solver, inner, loads).report.error
+                motion = asking.solve(rung.solver, inner, loads)
             except RefusedError as refused:
                 refusal = refused
                 continue
-            coarser = _Prepared(solver=rung.solver, inner=inner)
-            if error <= self.accuracy:
-                return coarser
-        if coarser is None:
+            found = _Prepared(solver=rung.solver, inner=inner)
+            coarser = [velocity for claim, velocity in before if claim >= _INDEPENDENT * rung.claim]
+            agreed = any(self._agree(velocity, motion.velocity, at.radii) for velocity in coarser)
+            if agreed or rung.trust * motion.report.error <= self.accuracy:
+                break
+            before.append((rung.claim, motion.velocity))
+        if found is None:
             raise refusal
-        return coarser
+        return found
+
+    def _agree(self, coarse: Array, fine: Array, radii: Array) -> bool:
+        """Tell whether answers (N, 6, k) differ by less than is allowed, so that the finer one is right for sure."""
+        apart = [relative_error(coarse[..., k], fine[..., k], radii) for k in range(fine.shape[-1])]
+        return max(apart) <= self.accuracy
 
     def _plan_of(self, rung: Rung) -> Any:
         if rung.label not in self.plans:

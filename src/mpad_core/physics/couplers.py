@@ -1,6 +1,5 @@
 """Which coupler and which drift a problem calls for, and the coupler that climbs a ladder of solvers."""
 
-from contextlib import suppress
 from typing import Any, Protocol
 
 from attrs import evolve, frozen
@@ -10,19 +9,33 @@ from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.mobility import Laddered
 from mpad_core.interfaces.values import Configuration
 from mpad_core.physics import asking
-from mpad_core.physics.coupling import Coupler, Coupling, NoCoupling, SolverCoupling, contact_range, typical_speed
+from mpad_core.physics.coupling import (
+    NOT_WATCHED,
+    Coupler,
+    Coupling,
+    NoCoupling,
+    SolverCoupling,
+    Watch,
+    contact_range,
+    typical_speed,
+)
+from mpad_core.physics.levels import relative_error
 from mpad_core.physics.problem import Problem
+
+_PATIENCE = 1.5  # by which an estimate that proved too large must grow before it is doubted again
 
 
 @frozen(kw_only=True, eq=False)
 class LadderCoupling:
-    """The coupling as the lowest rung has it whose error, as it reports it, meets the request; none lower than before.
+    """The coupling as the lowest rung has it whose error seems to meet the request; none lower than before.
 
-    A rung that refuses is passed over, too; the last one's answer is taken as it is.
+    The error reported, times the trust in it, is watched. Where it is too large the next rung is asked: if the two
+    differ by more than is allowed, the run climbs; if not, the estimate was too large, and is trusted less. A rung that
+    refuses is passed over; the last one's answer is taken as it is.
     """
 
     rungs: tuple[SolverCoupling, ...]
-    trusts: tuple[float, ...]  # true errors over those reported
+    trusts: tuple[float, ...]  # true errors over those reported, to begin with
     accuracy: float
 
     @property
@@ -30,16 +43,42 @@ class LadderCoupling:
         """The plans of all rungs."""
         return tuple(rung.plan for rung in self.rungs)
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None, level: int = 0) -> Coupling:
-        """Ask rung by rung, from `level` on; another rung's guess is of no use."""
-        last = len(self.rungs) - 1
-        for climbed in range(level, last):
-            with suppress(RefusedError):
-                found = self.rungs[climbed].at(configuration, mean_loads, guess)
-                if self.trusts[climbed] * found.error <= self.accuracy:
-                    return evolve(found, level=climbed)
-            guess = None
-        return evolve(self.rungs[last].at(configuration, mean_loads, guess), level=last)
+    def at(
+        self, configuration: Configuration, mean_loads: Array, guess: Array | None, watch: Watch = NOT_WATCHED
+    ) -> Coupling:
+        """Ask the rung of before, and climb if need be; another rung's guess is of no use."""
+        level, trust = watch.level, watch.trust or self.trusts[watch.level]
+        found = self._asked(level, configuration, mean_loads, guess)
+        while level < len(self.rungs) - 1 and (found is None or trust * _reported(found) > self.accuracy):
+            higher = self._asked(level + 1, configuration, mean_loads, None)
+            if found is not None and higher is not None and self._agree(found, higher):
+                trust = self.accuracy / (_PATIENCE * _reported(found))
+                break
+            level, found, trust = level + 1, higher, self.trusts[level + 1]
+        assert found is not None  # the last rung raises if it refuses
+        return evolve(found, watch=Watch(level, trust))
+
+    def _asked(
+        self, level: int, configuration: Configuration, mean_loads: Array, guess: Array | None
+    ) -> Coupling | None:
+        """Give one rung's answer, or nothing if it refuses and there are others."""
+        try:
+            return self.rungs[level].at(configuration, mean_loads, guess)
+        except RefusedError:
+            if level == len(self.rungs) - 1:
+                raise
+        return None
+
+    def _agree(self, found: Coupling, higher: Coupling) -> bool:
+        assert found.felt is not None
+        assert higher.felt is not None
+        radii = self.rungs[0].problem.radii
+        return relative_error(found.felt.velocity, higher.felt.velocity, radii) <= self.accuracy
+
+
+def _reported(coupling: Coupling) -> float:
+    assert coupling.felt is not None  # rungs are watched
+    return coupling.felt.report.error
 
 
 def coupler(problem: Problem, plan: Any = None) -> Coupler:
@@ -90,7 +129,7 @@ class LadderDrift:
 
     def added(self, coupling: Coupling, configuration: Configuration, step: int) -> Coupling:
         """Ask the rung."""
-        return self.rungs[coupling.level].added(coupling, configuration, step)
+        return self.rungs[coupling.watch.level].added(coupling, configuration, step)
 
 
 def drift_of(problem: Problem, coupling: Coupler) -> Drift:

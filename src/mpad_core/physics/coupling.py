@@ -7,7 +7,7 @@ that makes the frozen equation give the full solve's velocities under the presen
 push a cell through the wall; a frozen load cannot.
 """
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from attrs import evolve, frozen
@@ -16,7 +16,7 @@ from scipy.linalg import block_diag, cho_factor, cho_solve
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import PartError, RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
-from mpad_core.interfaces.values import Configuration, Setting
+from mpad_core.interfaces.values import Configuration, Motion, Setting
 from mpad_core.numerics.wall_functions import wall_resistance, wall_shear_load
 from mpad_core.physics import asking
 from mpad_core.physics.problem import LARGEST_GROUP, Problem
@@ -29,6 +29,16 @@ _ASYMMETRY = 0.1  # of sqrt(M_ii M_jj): coarse boundary elements reach 0.03 (nea
 _REACHES = (2.0, 1.0, 0.5, 0.25)  # radii: gaps within which cells are put into one group, where they are many
 
 
+class Watch(NamedTuple):
+    """Where a run is on a ladder of solvers, and by how much it trusts the error that is reported there."""
+
+    level: int = 0
+    trust: float = 0.0  # true errors over those reported; 0: as the ladder has it
+
+
+NOT_WATCHED = Watch()
+
+
 @frozen(kw_only=True, eq=False)
 class Coupling:
     """The frozen coupling of the free cells, group by group."""
@@ -37,8 +47,8 @@ class Coupling:
     matrices: tuple[Array, ...]  # (6n, 6n) each: C
     loads: Array  # (N, 6): k + g
     guess: Array | None = None
-    error: float = 0.0  # that the solver reports of the motion under the mean loads; 0 where nobody watches it
-    level: int = 0  # the rung that gave it, where the solver stands for several
+    felt: Motion | None = None  # the motion under the mean loads, where it was asked for
+    watch: Watch = NOT_WATCHED
 
 
 class Coupler(Protocol):
@@ -49,10 +59,12 @@ class Coupler(Protocol):
         """The solver's plan, or None."""
         ...
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None, level: int = 0) -> Coupling:
+    def at(
+        self, configuration: Configuration, mean_loads: Array, guess: Array | None, watch: Watch = NOT_WATCHED
+    ) -> Coupling:
         """Give the coupling there; `mean_loads` (N, 6) are those under which distant cells are felt.
 
-        `level` is the lowest rung to ask, where the solver stands for several.
+        `watch` is what is kept from the coupling before, where the solver stands for several.
         """
         ...
 
@@ -101,7 +113,9 @@ class NoCoupling:
     touching: float  # µm, smooth gap below which cells may be in contact, and so must be solved together
     plan: Any = None
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None, level: int = 0) -> Coupling:
+    def at(
+        self, configuration: Configuration, mean_loads: Array, guess: Array | None, watch: Watch = NOT_WATCHED
+    ) -> Coupling:
         """Give zero; free cells share a group only where they may touch."""
         groups = linked(configuration, np.flatnonzero(~self.problem.held), self.touching)
         matrices = tuple(np.zeros((6 * len(group), 6 * len(group))) for group in groups)
@@ -159,9 +173,11 @@ class SolverCoupling:
     plan: Any
     speed: float  # µm/s, typical of the problem
     touching: float  # µm, smooth gap below which cells may be in contact
-    watched: bool = False  # whether to ask for the error of the motion under the mean loads
+    watched: bool = False  # whether to ask for the motion under the mean loads, to see how good it is
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None, level: int = 0) -> Coupling:
+    def at(
+        self, configuration: Configuration, mean_loads: Array, guess: Array | None, watch: Watch = NOT_WATCHED
+    ) -> Coupling:
         """Solve each group with the held cells; account for all that lies outside by one full solve.
 
         Raises
@@ -173,7 +189,7 @@ class SolverCoupling:
         held = np.flatnonzero(problem.held)
         groups = group_cells(configuration, problem.held, self.touching)
         loads = np.zeros((len(problem.radii), 6))
-        matrices, error = [], 0.0
+        matrices, felt = [], None
         few = len(problem.radii) - len(held) <= LARGEST_GROUP  # then the guess is of the one group's block
         for group in groups:
             members = np.concatenate([group, held])
@@ -185,7 +201,7 @@ class SolverCoupling:
             resistance = self._inverse(mobility, members)
             guess = found if few else guess
             if self.watched and len(groups) == 1:
-                error = self._error(prepared, mobility, free, mean_loads[members], len(group))
+                felt = self._felt(prepared, mobility, free, mean_loads, members)
             own = 6 * len(group)
             for place, cell in enumerate(group):
                 lone, ambient = self._lone(configuration, cell)
@@ -194,8 +210,9 @@ class SolverCoupling:
                 resistance[o : o + 6, o : o + 6] -= lone
             matrices.append(np.ascontiguousarray(resistance[:own, :own]))
         if len(groups) > 1:
-            guess, error = self._add_outside(configuration, groups, matrices, loads, mean_loads, guess)
-        return Coupling(groups=groups, matrices=tuple(matrices), loads=loads, guess=guess, error=error)
+            felt = self._add_outside(configuration, groups, matrices, loads, mean_loads, guess)
+            guess = felt.guess
+        return Coupling(groups=groups, matrices=tuple(matrices), loads=loads, guess=guess, felt=felt)
 
     def _lone(self, configuration: Configuration, cell: int) -> tuple[Array, Array]:
         height = float(configuration.centres[cell, 2])
@@ -218,19 +235,22 @@ class SolverCoupling:
             ) from error
         return np.asarray(0.5 * (resistance + resistance.T))
 
-    def _error(self, prepared: Any, mobility: Array, free: Array, loads: Array, own: int) -> float:
-        """Give the error that the solver reports of the motion under loads (n, 6); those from `own` on are held."""
-        loads, m = loads.copy(), 6 * own
-        if own < len(loads):
-            passed = free[m:] + mobility[m:, :m] @ loads[:own].ravel()
-            loads[own:] = np.linalg.solve(mobility[m:, m:], -passed).reshape(-1, 6)
-        return asking.solve(self.problem.solver, prepared, loads).report.error
+    def _felt(self, prepared: Any, mobility: Array, free: Array, mean_loads: Array, members: Indices) -> Motion:
+        """Give the motion of members, all there are, under the mean loads, and under those that keep the held ones."""
+        held = self.problem.held[members]
+        rows, loads = np.repeat(held, 6), mean_loads[members]
+        loads[held] = 0.0
+        if held.any():
+            passed = free[rows] + mobility[rows] @ loads.ravel()
+            loads[held] = np.linalg.solve(mobility[np.ix_(rows, rows)], -passed).reshape(-1, 6)
+        motion = asking.solve(self.problem.solver, prepared, loads)
+        return evolve(motion, velocity=motion.velocity[np.argsort(members)])
 
     def _add_outside(
         self, configuration: Configuration, groups: tuple[Indices, ...], matrices: list[Array], loads: Array,
         mean_loads: Array, guess: Array | None,
-    ) -> tuple[Array | None, float]:  # fmt: skip
-        """Add g to the loads of every group; give the solver's next guess, and the error it reports."""
+    ) -> Motion:  # fmt: skip
+        """Add g to the loads of every group; give the full solve's motion."""
         prepared = self._prepared(configuration, guess)
         held = np.flatnonzero(self.problem.held)
         unit = unit_load(self.problem.setting.viscosity, float(configuration.radii.max()), self.speed)
@@ -241,7 +261,7 @@ class SolverCoupling:
                 lone, ambient = self._lone(configuration, cell)
                 wanted = lone @ motion.velocity[cell] + coupled[place]
                 loads[cell] = wanted - mean_loads[cell] - ambient
-        return motion.guess, motion.report.error
+        return motion
 
 
 def contact_reach(problem: Problem) -> float:

@@ -101,6 +101,7 @@ class State:
     caught_since: Array  # (N,) s; infinite until the cell is caught
     guess: Array | None = None  # of the solver
     level: int = 0  # the rung climbed to, where the solver stands for several
+    trust: float = 0.0  # in the error that it reports
     events: Any = field(factory=_no_events)  # bond events of the last outer step; not part of what going on needs
     way: Way | None = None  # of the last outer step; neither is this
 
@@ -162,7 +163,7 @@ def from_arrays(arrays: Mapping[str, Any], cells: int, sites: int) -> State:
         If the arrays are not a state of so many cells with so many sites in all.
     """
     own = {name.removeprefix("state."): value for name, value in arrays.items() if name.startswith("state.")}
-    whole = {name: own.pop(name).item() for name in ("step", "zero", "time", "level")}
+    whole = {name: own.pop(name).item() for name in ("step", "zero", "time", "level", "trust")}
     bonds = BondList(**{n.removeprefix("bonds."): v for n, v in arrays.items() if n.startswith("bonds.")})
     state = State(**whole, **own, bonds=bonds, guess=arrays.get("guess"))
     _check(state, cells, sites)

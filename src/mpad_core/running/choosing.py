@@ -33,6 +33,7 @@ _MARGIN = 10.0  # by which the reference is to be better than what is asked for
 _MOST_CELLS = 40  # at which solvers are tried: those nearest to the closest pair
 _ROUNDING = 1e-11  # of the error: below, neither it nor its estimate means anything
 _LEAST_TRUST = 0.1  # an estimate far too large somewhere may be right elsewhere
+_CLEARLY = 3.0  # times better is a rung to climb to, since two that err alike agree for nothing
 _TIMED = 0.1  # s, and three times at least
 
 
@@ -183,7 +184,7 @@ def _choice(trials: Sequence[Trial], finest: Sequence[Level], accuracy: float, p
     good = sorted((trial for trial in trials if trial.error <= accuracy), key=lambda trial: trial.seconds)
     ladder = good[:1]
     for trial in sorted(trials, key=lambda trial: trial.seconds):
-        if good and trial.error < ladder[-1].error and trial.seconds > ladder[-1].seconds:
+        if good and _CLEARLY * trial.error < ladder[-1].error and trial.seconds > ladder[-1].seconds:
             ladder.append(trial)
     labels = [trial.level.label for trial in ladder] + [level.label for level in finest]
     trusts = [float(f"{trial.trust:.3g}") for trial in ladder] + [1.0] * len(finest)

@@ -16,7 +16,7 @@ from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.tables import value
 from mpad_core.physics.couplers import Drift, coupler, drift_of
-from mpad_core.physics.coupling import Coupler, Coupling, contact_range, contact_reach, joined
+from mpad_core.physics.coupling import Coupler, Coupling, Watch, contact_range, contact_reach, joined
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, Way
 from mpad_core.physics.wall_density import Rasters, rasters
@@ -103,7 +103,7 @@ def step(machine: Machine, state: State, until: float) -> State:
     moves = pace.pair_moves(problem, _coupled_pairs(machine, state), state.centres, machine.pace.share)
     stride = pace.stride_of(problem, machine.pace, moves, state.drift, until - state.time)
     middle = _ahead(problem, state, 0.5 * stride.sub_steps * stride.grains * machine.pace.grain)
-    coupling = machine.coupler.at(middle, state.mean_loads, state.guess, state.level)
+    coupling = machine.coupler.at(middle, state.mean_loads, state.guess, Watch(state.level, state.trust))
     coupling = machine.drift.added(coupling, middle, state.step)
     bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, stride)
     return _burst(machine, state, joined(coupling, state.bonds.pairs()), bounds, stride.grains)
@@ -184,7 +184,8 @@ def _next(machine: Machine, state: State, made: _Done, coupling: Coupling, strid
         clocks=made.clocks.left,
         draws=made.clocks.number.astype(float),
         guess=coupling.guess,
-        level=coupling.level,
+        level=coupling.watch.level,
+        trust=coupling.watch.trust,
         events=_in_order(made.events, state.zero, stride, machine.pace.grain),
         way=_way(state, made, machine.pace.grain),
     )
