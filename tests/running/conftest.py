@@ -133,7 +133,7 @@ def same() -> Callable[[State, State], bool]:
 
     def equal(a: State, b: State) -> bool:
         names = ("step", "zero", "time", "centres", "wall_gaps", "orientations", "velocities", "drift", "mean_loads")
-        more = ("clocks", "draws", "bound_since", "bound_at", "caught_since")
+        more = ("clocks", "draws", "bound_since", "bound_at", "caught_since", "level", "trust")
         bonds = ("cell", "site", "species", "state", "partner", "ligand", "anchor")
         return all(np.array_equal(getattr(a, n), getattr(b, n)) for n in names + more) and all(
             np.array_equal(getattr(a.bonds, n), getattr(b.bonds, n)) for n in bonds

@@ -17,6 +17,11 @@ FEW = ['stop.time="400 ms"', "stop.when=[]", 'cells.roller.start.rolling_alone="
 VARIANTS = {
     "isolated": [*FEW[1:], 'stop.time="120 ms"', 'solver="isolated"'],
     "thermal": [*FEW[1:], 'stop.time="120 ms"', 'effects.thermal="on"'],
+    "auto": [
+        *FEW[1:],
+        'stop.time="120 ms"',
+        'solver={name="auto", accuracy=1e-2, levels=["rpb lone_sphere=exact", "cdl-biem accuracy=0.01"]}',
+    ],
     "pairs": [*FEW[1:], 'stop.time="120 ms"', 'bonds.tether.reach="pairs"'],
 }
 

@@ -18,6 +18,7 @@ from mpad_core.physics.questions import unit_load
 from mpad_core.plugins.hookspecs import hookimpl
 
 _WORTH_TRYING = 1.6  # times less than the rung before is what the next one claims
+_DOUBT = 2.0  # by which estimates that nothing has been compared with may fall short
 _INDEPENDENT = 3.5  # claims so many times apart are of solvers that do not err alike
 
 
@@ -26,10 +27,10 @@ class Auto:
     """The cheapest installed solver that is as exact as asked for.
 
     A run chooses once, at its start, by trying all solvers on the scene itself, writes its choice into the resolved
-    scene, and climbs to a more exact one where the error on the way no longer meets the request. Asked without a run, it
-    tries the installed levels from the coarsest claim on, until one reports an error that meets the request, or agrees
-    with a coarser one: under weights, and in the flow, or where there is none under loads that push spheres together.
-    So one configuration is answered by one solver, whatever the loads.
+    scene, and climbs to a more exact one where the error on the way no longer meets the request. Asked without a run,
+    it tries the installed levels from the coarsest claim on, until one reports an error that meets the request, or
+    agrees with a coarser one: under weights, and in the flow, or where there is none under loads that push spheres
+    together. So one configuration is answered by one solver, whatever the loads.
 
     Parameters
     ----------
@@ -134,7 +135,8 @@ class _Plan:
     plans: dict[str, Any] = field(factory=dict)
 
     def prepared(self, at: Configuration) -> _Prepared:
-        loads, found, before = _tried_loads(self.setting, at), None, []
+        loads, found = _tried_loads(self.setting, at), None
+        before: list[tuple[float, Array]] = []
         for rung in self.rungs:
             try:
                 inner = asking.prepare(rung.solver, self._plan_of(rung), at)
@@ -145,7 +147,7 @@ class _Plan:
             found = _Prepared(solver=rung.solver, inner=inner)
             coarser = [velocity for claim, velocity in before if claim >= _INDEPENDENT * rung.claim]
             agreed = any(self._agree(velocity, motion.velocity, at.radii) for velocity in coarser)
-            if agreed or rung.trust * motion.report.error <= self.accuracy:
+            if agreed or _DOUBT * rung.trust * motion.report.error <= self.accuracy:
                 break
             before.append((rung.claim, motion.velocity))
         if found is None:

@@ -14,6 +14,8 @@ def summary_lines(summary: dict[str, Any], directory: Path) -> Iterator[str]:
             yield f"  {name}: {_cell(cell)}"
     if "passage" in summary:
         yield from _passage_lines(summary["passage"])
+    if "solver_choice" in summary:
+        yield f"solver chosen: {summary['solver_choice']['reason']}"
     yield f"written to {directory}"
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from attrs import frozen
 
 from mpad_core.interfaces.errors import InputError
+from mpad_core.physics.auto import Auto
 from mpad_core.physics.problem import Problem
 from mpad_core.records.lock import locked
 from mpad_core.records.log import RunLog
@@ -250,8 +251,21 @@ def _summary(scene: Scene, results: list[Result], wall: float) -> dict[str, Any]
     }
     if scene.passage:
         summary["passage"] = _passage(scene, results)
+    if isinstance(first.case.problem.solver, Auto):
+        summary["solver_choice"] = _choice(results)
     plain: dict[str, Any] = _plain(summary)
     return plain
+
+
+def _choice(results: list[Result]) -> dict[str, Any]:
+    """Describe what `auto` chose, and what it had climbed to at the end of each run."""
+    solver = results[0].case.problem.solver
+    return {
+        "accuracy": solver.accuracy,
+        "chose": solver.levels[0],
+        "reason": solver.reason,
+        "at_end": [solver.levels[result.outcome.state.level] for result in results],
+    }
 
 
 def _paths(scene: Scene, results: list[Result], control: bool) -> tuple[list[Path], list[Path]]:
