@@ -100,7 +100,7 @@ def test_a_resumed_run_keeps_the_choice_and_another_accuracy_is_another_scene(tm
 def test_a_run_climbs_and_its_level_is_part_of_the_state(tmp_path: Path) -> None:
     """The free cell overtakes the held one; rpb does while they are far apart, not when they are near."""
     text = (
-        TEXT.format(accuracy=0.03, held="true")
+        TEXT.format(accuracy=3e-3, held="true")
         .replace('"15 ms"', '"150 ms"')
         .replace('"-14 um"', '"-40 um"')
         .replace('"9 um"', '"11 um"')
