@@ -107,6 +107,11 @@ def parts() -> None:
         click.echo(line)
 
 
+def _spaced(text: str) -> str:
+    """Put a space between a number and its unit, where there is none."""
+    return re.sub(r"(?<=[\d.])(?=[^\d.eE+\-\s])", " ", text, count=1)
+
+
 def _quantity(name: str, unit: str, say: str, default: str | None = None) -> Callable[[F], F]:
     """Make an option that is a number and its units, with or without a space between; a float in `unit` inside."""
 
@@ -116,7 +121,7 @@ def _quantity(name: str, unit: str, say: str, default: str | None = None) -> Cal
         if text is None:
             return None
         try:
-            return convert(re.sub(r"(?<=[\d.])(?=[^\d.eE+\-\s])", " ", text, count=1), unit)
+            return convert(_spaced(text), unit)
         except UnitsError as error:
             raise click.BadParameter(str(error)) from error
 
@@ -154,6 +159,42 @@ def measure(sources: tuple[Path, ...], as_json: bool, output: Path | None, **how
         click.echo(line)
     if output:
         click.echo(f"written to {write_report(report, output)}", err=as_json)
+
+
+def _places(context: click.Context, parameter: click.Parameter, texts: tuple[str, ...]) -> tuple[float, ...]:
+    """Read quantities in µm; a plain number is one already."""
+    from mpad_core.units import UnitsError, convert
+
+    try:
+        return tuple(float(t) if re.fullmatch(r"[+-]?[\d.]+", t) else convert(_spaced(t), "um") for t in texts)
+    except (UnitsError, ValueError) as error:
+        raise click.BadParameter(str(error)) from error
+
+
+@mpad.command()
+@_SCENE
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="Directory; runs/<scene's name>-cost if left out."
+)
+@click.option("--long", "long", is_flag=True, help="Also the scene's bonds: captures and rolling; leave nothing out.")
+@click.option(
+    "--solver", "solvers", multiple=True, metavar="NAME", help="Only this solver; may be given several times."
+)
+@click.option("--at", multiple=True, callback=_places, metavar="QUANTITY",
+              help="Compare passages at this dx, such as '-15 um'; may be given several times.")  # fmt: skip
+@_SET
+def cost(scene: Path, output: Path | None, overrides: tuple[str, ...], **options: Any) -> None:
+    """Measure on a scene what accuracy costs: each solver at each level, the time step, the bond engine."""
+    from mpad_core.scene.files import load_scene
+    from mpad_core.studies.cost.study import Options
+    from mpad_core.studies.cost.study import cost as measure_cost
+    from mpad_core.studies.cost.table import table_lines
+
+    loaded, directory = load_scene(scene, overrides), output or Path("runs") / f"{scene.stem}-cost"
+    found = measure_cost(loaded, directory, Options(**options), say=lambda text: click.echo(f"  {text}", err=True))
+    for line in table_lines(found):
+        click.echo(line)
+    click.echo(f"written to {directory}")
 
 
 def main() -> None:

@@ -23,11 +23,11 @@ from mpad_core.running.choosing import kept_choice, settled
 from mpad_core.running.recorder import TRAJECTORY, Recording
 from mpad_core.running.run import CHECKPOINT_EVERY, Order, Outcome, run_one
 from mpad_core.running.schedules import Cadence
-from mpad_core.running.stopping import StopWhen
 from mpad_core.scene.attached import files_of
 from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
 from mpad_core.scene.writing import resolved_toml
+from mpad_core.studies.conditions import stop_conditions
 from mpad_core.studies.passage import Path, describe, free_part, path_of
 
 SCENE, SUMMARY, LOG, PICTURE = "scene.toml", "summary.json", "run.jsonl", "passage.png"
@@ -184,10 +184,6 @@ def _order(scene: Scene, text: str, case: Case, checkpoint_every: float) -> Orde
         if scene.passage
         else next((name for name, held in zip(problem.names, problem.held, strict=True) if not held), problem.names[0])
     )
-    conditions = [
-        StopWhen(cell=c.cell, quantity=c.quantity, above=c.op == ">", value=c.value, text=str(c))
-        for c in scene.stop.when
-    ]
     recording = Recording(
         scene=text,
         title=scene.title + (" (control)" if case.control else ""),
@@ -199,7 +195,7 @@ def _order(scene: Scene, text: str, case: Case, checkpoint_every: float) -> Orde
         problem=problem,
         recording=recording,
         until=scene.stop.time,
-        stop_when=conditions,
+        stop_when=stop_conditions(scene),
         checkpoint_every=checkpoint_every,
     )
 

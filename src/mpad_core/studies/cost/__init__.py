@@ -1,0 +1,1 @@
+"""Accuracy against time on a user's own scene: ``mpad cost``."""
