@@ -13,6 +13,7 @@ from mpad_core.studies.cost.rows import POSITION, RATE, RUN, SOLVE, Row, front
 
 _COLOURS = ("#1b4965", "#c1121f", "#e09f3e", "#3d8b8b", "#7b4b94", "#6a994e", "#b5651d", "#5c677d")
 _GREY = "#8d99ae"
+_FEW_DECADES = 10**1.8
 _TOLERANCES = {"position": "#000000", "rate": "#8d99ae"}
 
 
@@ -35,6 +36,8 @@ def draw(found: Found, file: Path) -> None:
     figure.suptitle(found.title, x=0.01, ha="left", fontsize=11)
     figure.canvas.draw()  # places the axes, and so the points that labels must not cover
     for panel in panels.values():
+        _mark_axis(panel.xaxis)
+        _mark_axis(panel.yaxis)
         place_labels(panel)
     figure.savefig(file, dpi=130)
 
@@ -56,6 +59,8 @@ def _draw_solves(panel: Any, found: Found, colours: dict[str, str]) -> None:
     panel.set_xlabel("time of one solve (ms)")
     panel.set_ylabel("relative error of velocities")
     panel.set_title("one solve", loc="left", fontsize=10)
+    panel.plot([], [], color="0.85", lw=7, label="nothing is both faster and more exact")
+    panel.legend(frameon=False, fontsize=8, loc="upper right")
 
 
 def _draw_paths(panel: Any, found: Found, colours: dict[str, str]) -> None:
@@ -63,6 +68,7 @@ def _draw_paths(panel: Any, found: Found, colours: dict[str, str]) -> None:
     _draw_lines(panel, rows, colours, 1.0, 1e3)
     _draw_lines(panel, steps, colours, 1.0, 1e3)
     _draw_bound(panel, rows, 1e3)
+    _explain(panel, {"position": f"{dict(found.facts).get('solver', '')}, tolerance of positions"} if steps else {})
     seeds = float(dict(found.facts).get("seeds", "nan"))
     if math.isfinite(seeds):
         panel.axhline(seeds, color=_GREY, lw=1, ls=":")
@@ -75,6 +81,7 @@ def _draw_paths(panel: Any, found: Found, colours: dict[str, str]) -> None:
 
 def _draw_events(panel: Any, found: Found) -> None:
     _draw_lines(panel, found.of(RATE), _TOLERANCES, 1.0, 1.0)
+    _explain(panel, {"position": "tolerance of positions", "rate": "tolerance of rates"})
     panel.set_xlabel("time of the run (s)")
     panel.set_ylabel("relative error of waiting times")
     panel.set_title("bond events", loc="left", fontsize=10)
@@ -95,9 +102,31 @@ def _draw_lines(panel: Any, rows: Sequence[Row], colours: dict[str, str], per_se
         panel.plot(x, y, color=colours[line], lw=1.2, zorder=2)
         for at, row in zip(zip(x, y, strict=True), own, strict=True):
             _draw_point(panel, at, row, colours[line], row in best)
-    panel.set(xscale="log", yscale="log")
+    if any(_can_be_drawn(row) for row in rows):
+        panel.set(xscale="log", yscale="log")
     panel.grid(color="0.93")
-    panel.margins(0.12)
+    panel.margins(0.14)
+
+
+def _explain(panel: Any, lines: dict[str, str]) -> None:
+    """Say what the lines are whose labels are only values."""
+    for line, text in lines.items():
+        panel.plot([], [], color=_TOLERANCES[line], lw=1.2, label=text)
+    if lines:
+        panel.legend(frameon=False, fontsize=8, loc="upper right")
+
+
+def _mark_axis(axis: Any) -> None:
+    """Write plain numbers at decades, and between them where there are few."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    if axis.get_scale() != "log":
+        return  # nothing has been drawn
+    axis.set_minor_formatter(NullFormatter())
+    if high / low < _FEW_DECADES:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
 
 
 def _can_be_drawn(row: Row) -> bool:
@@ -117,8 +146,7 @@ def _draw_bound(panel: Any, rows: Sequence[Row], scale: float) -> None:
         low = min(0.3 * bounds[0], panel.get_ylim()[0])
         panel.axhspan(low, bounds[0], color="0.9", lw=0, zorder=0)
         panel.set_ylim(bottom=low)
-        panel.annotate("the reference's own error", (0.01, bounds[0]), xycoords=("axes fraction", "data"), fontsize=8,
-                       color="0.45", xytext=(0, -10), textcoords="offset points")  # fmt: skip
+        panel.text(0.01, 0.02, "the reference's own error", transform=panel.transAxes, fontsize=8, color="0.45")
 
 
 def short(row: Row) -> str:

@@ -115,7 +115,7 @@ def _parts(scene: Scene, levels: Sequence[Level], asked: Options, say: Callable[
 
     say("the scene's own run")
     subject = subject_of(scene, SITUATIONS, asked.at)
-    own = own_level(scene, levels)
+    own = own_level(scene, levels) if scene.solver.name in (asked.solvers or (scene.solver.name,)) else None
     yield told(SOLVE, (), **_facts(subject))
     known = Solves()
     for known in solves(subject, [*([own] if own else []), *levels]):
