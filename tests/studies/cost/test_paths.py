@@ -17,6 +17,7 @@ from mpad_core.studies.cost.replays import waiting_errors
 from mpad_core.studies.cost.rows import RUN
 from mpad_core.studies.cost.runs import judged, run_of
 from mpad_core.studies.cost.subject import _places, subject_of
+from mpad_core.studies.cost.tolerances import FACTORS, position_runs
 
 RECRUITMENT = Path(__file__).parents[3] / "examples" / "recruitment.toml"
 
@@ -104,3 +105,10 @@ def test_waiting_times_by_hand():
     assert np.sort(errors) == pytest.approx(np.sort([0.1 / mean, 0.3 / mean, 0.1 / 2.0]))
     assert waiting_errors([expected], [expected]).tolist() == [0.0] * 4
     assert len(waiting_errors([], [])) == 0
+
+
+def test_what_takes_too_long_is_left_out_and_said_to_be(two_cells):
+    subject = subject_of(two_cells, 2)
+    *_, rows = position_runs(subject, budget=-1.0)
+    assert len(rows) == len(FACTORS)
+    assert all("add --long" in row.note and np.isnan(row.error) for row in rows)

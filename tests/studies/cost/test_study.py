@@ -72,7 +72,7 @@ def test_a_scene_without_passage_or_bonds(mpad, scene_file, tmp_path, monkeypatc
 
 
 def test_one_level_alone_has_nothing_to_be_compared_with(mpad, scene_file, tmp_path):
-    code, out, err = mpad("cost", scene_file, "-o", tmp_path / "out", "--solver", "isolated")
+    code, _, err = mpad("cost", scene_file, "-o", tmp_path / "out", "--solver", "isolated")
     assert code == 0, err
     (row,) = [row for row in read(tmp_path / "out") if row["study"] == "solve"]
     assert (row["error"], row["reference"]) == ("", "True")

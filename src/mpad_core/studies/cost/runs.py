@@ -131,7 +131,7 @@ def _own_refresh(subject: Subject, tried: Sequence[Tried]) -> float:
 
 def _quiet_way(subject: Subject, problem: Problem) -> Way:
     machine = subject.quieted(problem)
-    return travel(machine, subject.scene.stop.time, ends_of(subject.scene, machine.problem))
+    return travel(machine, subject.until, ends_of(subject.scene, machine.problem))
 
 
 def _level_run(subject: Subject, one: Tried, needed: float, budget: float) -> Run:
@@ -156,6 +156,6 @@ def seeds_differ(subject: Subject, seeds: int = 2) -> float:
     own, wrong = subject.outcome.of(subject.own), []
     for replicate in range(1, seeds + 1):
         problem = compose(subject.scene, replicate)
-        way = travel(make_ready(problem), subject.scene.stop.time, ends_of(subject.scene, problem))
+        way = travel(make_ready(problem), subject.until, ends_of(subject.scene, problem))
         wrong.append(np.abs(subject.outcome.of(way) - own))
     return _middle(np.concatenate(wrong))

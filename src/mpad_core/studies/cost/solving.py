@@ -3,7 +3,6 @@
 Times are of compiled code, the least of several tries in each situation and the median over the situations.
 """
 
-import time
 import tracemalloc
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -16,6 +15,7 @@ from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.physics.coupling import coupler, typical_speed
 from mpad_core.physics.levels import Level, Situation, answer, relative_error
 from mpad_core.physics.problem import Problem
+from mpad_core.studies.cost.paths import Clock
 from mpad_core.studies.cost.rows import SOLVE, Row
 
 _TRIES = 3, 20  # of one solve, at least and at most, to find the least time
@@ -99,9 +99,9 @@ def with_errors(row: Row, found: Errors, bound: float) -> Row:
 
 
 def _setup_time(level: Level, problem: Problem, situation: Situation) -> float:
-    began = time.perf_counter()
+    clock = Clock()
     answers(level.solver, problem, [situation])
-    return time.perf_counter() - began
+    return clock.read()
 
 
 def _memory(level: Level, problem: Problem, situation: Situation) -> float:
@@ -136,7 +136,7 @@ def least_time(act: Callable[[], Any]) -> float:
     act()
     spent: list[float] = []
     while len(spent) < _TRIES[0] or (len(spent) < _TRIES[1] and sum(spent) < _LONG_ENOUGH):
-        began = time.perf_counter()
+        clock = Clock()
         act()
-        spent.append(time.perf_counter() - began)
+        spent.append(clock.read())
     return min(spent)

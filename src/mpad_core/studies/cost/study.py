@@ -20,6 +20,7 @@ from mpad_core.studies.cost.subject import Subject, own_level, subject_of
 from mpad_core.studies.cost.tolerances import has_events, position_runs, rate_runs
 
 SITUATIONS = 12
+_FEW_SECONDS = 20.0  # of a run of the scene, for it to be repeated with other seeds
 BUDGET = 90.0  # s of computing, for whole runs with every solver, and as much for those with other steps
 
 
@@ -123,10 +124,13 @@ def _parts(scene: Scene, levels: Sequence[Level], asked: Options, say: Callable[
         yield told(SOLVE, known.rows(subject))
     if not known.answered:
         raise RefusedError(f"no level answers in this scene; the last: {known.tried[0].row.note}")
+    said: set[tuple[str, str]] = set()
     for study, rows in _runs(subject, known, asked):
-        say(f"{study}: {rows[-1].label if study != RUN else len(rows)}")
+        fresh = [row.label for row in rows if (study, row.label) not in said]
+        said |= {(study, row.label) for row in rows}
+        say(f"{study}: {', '.join(fresh) or 'a finer setting than the finest level'}")
         yield told(study, rows)
-    if subject.problem.site_densities.any() and subject.outcome is not None:
+    if subject.problem.site_densities.any() and subject.outcome is not None and subject.own.took < _FEW_SECONDS:
         say("other seeds")
         yield told(RUN, (), seeds=f"{1e3 * seeds_differ(subject):.2g}")
 

@@ -33,6 +33,7 @@ class Subject:
     problem: Problem
     cell: int  # that is followed
     own: Way
+    until: float  # s, when runs end at the latest: as the scene says, or where its own run was given up
     situations: tuple[Situation, ...]
     outcome: Outcome | None  # what paths without bonds are compared by; none where there is no such path
 
@@ -82,8 +83,9 @@ def subject_of(scene: Scene, number: int, at: Sequence[float] = ()) -> Subject:
     _compile(machine)
     cell = first_free(problem, (scene.passage.cell,) if scene.passage else ())
     own = travel(machine, scene.stop.time, ends_of(scene, problem, _PATIENCE))
+    until = float(own.last.time) if own.took > _PATIENCE else scene.stop.time
     return Subject(
-        scene=scene, problem=problem, cell=cell, own=own, outcome=_outcome(scene, own, cell, at),
+        scene=scene, problem=problem, cell=cell, own=own, until=until, outcome=_outcome(scene, own, cell, at),
         situations=tuple(situations(machine, own.last.time, number)),
     )  # fmt: skip
 
