@@ -46,7 +46,9 @@ class Solves:
             return one.row
         size, against = (self.doubt.size, self.doubt.against) if self.doubt else (np.inf, "")
         row = with_errors(one.row, errors(one.answers, reference.answers, subject.problem.radii), size)
-        return evolve(row, error=size, reference=True, against=against) if one is reference else row
+        if one is not reference:
+            return row
+        return evolve(row, error=size, worst=np.nan, normal=np.nan, reference=True, against=against)
 
 
 def solves(subject: Subject, levels: Sequence[Level]) -> Iterator[Solves]:
@@ -73,6 +75,8 @@ def _tried(subject: Subject, level: Level) -> Tried:
 def _doubt(subject: Subject, answered: Sequence[Tried], last: bool) -> Doubt | None:
     """Tell how far the finest level may be wrong; None while that waits for the next coarser one."""
     found = [one.answers for one in answered if one.answers is not None]
-    if len(answered) == 1 and not last:
-        return doubt_by_finer(answered[-1].level, found[-1], subject.problem, subject.situations)
+    if len(answered) == 1:
+        by_finer = doubt_by_finer(answered[-1].level, found[-1], subject.problem, subject.situations)
+        if by_finer or not last:
+            return by_finer
     return doubt([one.level for one in answered], found, subject.problem)
