@@ -14,7 +14,9 @@ try:
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(f"{error}; install mpad-core[testing]", name=error.name) from error
 
-_ROOMS = ("bonds", "claims", "fluctuating", "forces", "invariance", "mobility", "solving", "surfaces")
+_ROOMS = (
+    "bonds", "claims", "energy", "exact", "fluctuating", "forces", "honesty", "invariance", "mobility", "solving", "surfaces",
+)  # fmt: skip
 pytest.register_assert_rewrite(*(f"{__name__}.{room}" for room in _ROOMS))  # before they are imported
 
 from mpad_core.testing.bonds import BondModelContract  # noqa: E402

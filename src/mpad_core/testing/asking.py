@@ -1,14 +1,24 @@
 """How contracts ask a mobility solver: what all of them share."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from attrs import evolve
+from attrs import evolve, frozen
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion, Setting
 
 SHEAR = Setting(viscosity=1.3, shear_rate=2.0)
+
+
+@frozen(kw_only=True, eq=False)
+class Place:
+    """Where a solver was asked: the fluid and the spheres."""
+
+    setting: Setting
+    at: Configuration
 
 
 class AskedSolver:
@@ -18,9 +28,19 @@ class AskedSolver:
     ----------
     solver
         The solver; give it in the class that inherits.
+    claimed
+        The error that the solver claims for its parameters, see `AccuracyLevel`; None: it claims none.
+    only
+        The one place at which all laws are to be asked, instead of those that they draw.
+    asked
+        The last place that a law has drawn: that of the example that a failing law is told by.
     """
 
     solver: MobilitySolver
+    claimed: float | None = None
+    only: Place | None = None
+    asked: Place | None = None
+    _fluid: Setting = SHEAR
 
     @property
     def tolerance(self) -> float:
@@ -32,10 +52,32 @@ class AskedSolver:
         traits = self.solver.traits
         if not (traits.wall if wall else traits.unbounded):
             pytest.skip(f"{self.solver.name} does not treat {'a wall' if wall else 'unbounded fluid'}")
-        return evolve(SHEAR, wall=wall, shear_rate=shear_rate if traits.ambient_flow else 0.0)
+        base = SHEAR if self.only is None else self.only.setting
+        if self.only is not None and base.wall != wall:
+            pytest.skip(f"the scene has {'no' if wall else 'a'} wall")
+        quiet = shear_rate == 0 or not traits.ambient_flow
+        self._fluid = evolve(base, wall=wall, shear_rate=0.0 if quiet else base.shear_rate)
+        return self._fluid
 
-    def fitting(self, at: Configuration) -> Configuration:
-        """Change a configuration into one that the solver says it can treat."""
+    def fitting(self, at: Configuration, fits: Callable[[Configuration], bool] | None = None) -> Configuration:
+        """Change a configuration into one that the solver says it can treat, and remember it.
+
+        Parameters
+        ----------
+        at
+            What a law asks for; the one place that is to be asked takes its place, if there is one.
+        fits
+            Whether a configuration is one that the law is about; left out: it is about any.
+        """
+        chosen = self._treated(at) if self.only is None else self.only.at
+        if fits is not None and not fits(chosen):
+            whose = f"{self.solver.name} treats no" if self.only is None else "the scene has no"
+            pytest.skip(f"{whose} spheres such as this law is about")
+        self.asked = Place(setting=self._fluid, at=chosen)
+        return chosen
+
+    def _treated(self, at: Configuration) -> Configuration:
+        """Leave out spheres and differences of radii that the solver does not treat."""
         traits = self.solver.traits
         if traits.largest_number is not None:
             at = at.part(np.arange(min(len(at.radii), traits.largest_number)))
@@ -68,6 +110,21 @@ class AskedSolver:
         """Give the largest difference of two mobility matrices, entries in Stokes' units."""
         scales = self.scales(setting, at)
         return float(np.max(np.abs(found - expected) / np.outer(scales, scales)))
+
+
+def single(at: Configuration) -> bool:
+    """Tell whether there is one sphere."""
+    return len(at.radii) == 1
+
+
+def paired(at: Configuration) -> bool:
+    """Tell whether there are two spheres."""
+    return len(at.radii) == 2
+
+
+def several(at: Configuration) -> bool:
+    """Tell whether there are two spheres or more."""
+    return len(at.radii) > 1
 
 
 def relative(found: Array, expected: Array, radii: Array) -> float:

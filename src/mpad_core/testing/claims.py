@@ -1,5 +1,9 @@
 """A claim: what is said, who says it, what was expected, what was found, and the verdict."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
 from attrs import frozen
 
 
@@ -46,6 +50,24 @@ class Claim:
             raise AssertionError(str(self))
 
 
+_STATED: ContextVar[list[Claim] | None] = ContextVar("stated", default=None)
+
+
+@contextmanager
+def collected() -> Iterator[list[Claim]]:
+    """Collect the claims that are stated inside, those that fail among them; what `mpad validate` lists."""
+    stated: list[Claim] = []
+    token = _STATED.set(stated)
+    try:
+        yield stated
+    finally:
+        _STATED.reset(token)
+
+
 def check(claim: str, source: str, expected: float, found: float) -> None:
     """State a claim and check it at once; see `Claim`."""
-    Claim(claim=claim, source=source, expected=expected, found=found).check()
+    stated = Claim(claim=claim, source=source, expected=float(expected), found=float(found))
+    listening = _STATED.get()
+    if listening is not None:
+        listening.append(stated)
+    stated.check()

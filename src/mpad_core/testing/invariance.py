@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.values import Configuration
-from mpad_core.testing.asking import AskedSolver, relative
+from mpad_core.testing.asking import AskedSolver, relative, several
 from mpad_core.testing.claims import check
 from mpad_core.testing.strategies import configurations, numbers, tried
 
@@ -95,7 +95,7 @@ class InvarianceContract(AskedSolver):
     @tried(_EXAMPLES)
     def test_names_of_spheres_do_not_matter(self, wall: bool, at: Configuration, seed: int) -> None:
         """Spheres in another order move as before."""
-        setting, at = self.setting(wall), self.fitting(at)
+        setting, at = self.setting(wall), self.fitting(at, several)
         order = np.random.Generator(np.random.Philox(seed)).permutation(len(at.radii))
         rows = (6 * order[:, None] + np.arange(6)).ravel()
         found, expected = self.matrix(setting, at.part(order)), self.matrix(setting, at)[np.ix_(rows, rows)]
@@ -110,7 +110,7 @@ class InvarianceContract(AskedSolver):
         """Mobility goes as 1/(ηa), 1/(ηa²) and 1/(ηa³), free motion as the shear rate, free of the viscosity."""
         setting, at = self.setting(wall), self.fitting(at)
         larger = _moved(at, length * at.centres, length)
-        other = evolve(setting, viscosity=viscosity, shear_rate=rate if self.solver.traits.ambient_flow else 0.0)
+        other = evolve(setting, viscosity=viscosity, shear_rate=rate if setting.shear_rate else 0.0)
         powers = np.tile(np.repeat([length**-0.5, length**-1.5], 3), len(at.radii))
         expected = self.matrix(setting, at) * np.outer(powers, powers) * setting.viscosity / viscosity
         found = self.apart(other, larger, self.matrix(other, larger), expected)

@@ -8,7 +8,7 @@ from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration
 from mpad_core.physics.questions import velocities
-from mpad_core.testing.asking import AskedSolver, relative
+from mpad_core.testing.asking import AskedSolver, paired, relative
 from mpad_core.testing.claims import check
 from mpad_core.testing.invariance import WALLS
 from mpad_core.testing.strategies import configurations, crowd, some_loads, tried
@@ -75,9 +75,7 @@ class SolvingContract(AskedSolver):
 
     def test_held_spheres(self) -> None:
         """A held sphere stays, and what holds it moves the others as the mobility says."""
-        setting, at = self.setting(), self.fitting(_PAIR)
-        if len(at.radii) < 2:
-            pytest.skip(f"{self.solver.name} treats one sphere only")
+        setting, at = self.setting(), self.fitting(_PAIR, paired)
         forces = some_loads((2, 3))
         moved = velocities(
             self.solver, at.centres, at.radii, viscosity=setting.viscosity, shear_rate=setting.shear_rate,
