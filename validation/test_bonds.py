@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from mpad_core.plugins.registry import installed, load
-from mpad_core.testing import BondModelContract, typical
+from mpad_core.testing import BondModelContract
+from mpad_core.testing.suite.cases import Chosen, cases
 
 
 class TestInstalledBonds(BondModelContract):
-    @pytest.fixture(autouse=True, params=[part.name for part in installed("bond")])
+    @pytest.fixture(autouse=True, params=cases("bond", Chosen()), ids=lambda case: case.label)
     def _part(self, request: Any) -> None:
-        self.model = typical(load("bond", request.param))
+        self.model = request.param.made()

@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from mpad_core.plugins.registry import installed, load
-from mpad_core.testing import GapForceContract, typical
+from mpad_core.testing import GapForceContract
+from mpad_core.testing.suite.cases import Chosen, cases
 
 
 class TestInstalledForces(GapForceContract):
-    @pytest.fixture(autouse=True, params=[part.name for part in installed("force")])
+    @pytest.fixture(autouse=True, params=cases("force", Chosen()), ids=lambda case: case.label)
     def _part(self, request: Any) -> None:
-        self.force = typical(load("force", request.param))
+        self.force = request.param.made()

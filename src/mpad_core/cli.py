@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import click
 
-from mpad_core.interfaces.errors import DiskFullError, MpadError, PartError
+from mpad_core.interfaces.errors import DiskFullError, InputError, MpadError, PartError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -195,6 +195,47 @@ def cost(scene: Path, output: Path | None, overrides: tuple[str, ...], **options
     for line in table_lines(found):
         click.echo(line)
     click.echo(f"written to {directory}")
+
+
+def _parts_option(kind: str) -> Callable[[F], F]:
+    """Make an option that names parts of a kind; it may be given several times."""
+    say = f"Only this {'bond model' if kind == 'bond' else kind}; may be given several times."
+    return click.option(f"--{kind}", f"{kind}s", multiple=True, metavar="NAME", help=say)
+
+
+@mpad.command()
+@_parts_option("solver")
+@_parts_option("bond")
+@_parts_option("surface")
+@_parts_option("force")
+@click.option("--at", type=click.Path(path_type=Path), metavar="SCENE", help="Only this scene's solver, at its cells.")
+@click.option("--examples", type=click.FloatRange(min=0, min_open=True), default=1.0, show_default=True,
+              help="Times as many examples of each law.")  # fmt: skip
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE.json",
+              help="Also write the table as JSON, and beside it scenes that reproduce failures.")  # fmt: skip
+def validate(at: Path | None, examples: float, output: Path | None, **named: tuple[str, ...]) -> None:
+    """Ask all laws of the installed parts; print claim, source, expected, found.
+
+    Without options: every solver at each of its levels, every bond model, surface and force law.
+    """
+    os.environ["MPAD_EXAMPLES"] = str(examples)  # read where laws are defined, by this process and its workers
+    try:
+        import mpad_core.testing  # noqa: F401
+    except ModuleNotFoundError as error:
+        raise InputError(str(error)) from error
+    from mpad_core.testing.report import table_lines
+    from mpad_core.testing.validating import asked, failure_line, scene_names, write
+    from mpad_core.testing.validating import validate as ask_all
+
+    found = ask_all(asked(named, at))
+    for line in table_lines(found):
+        click.echo(line)
+    for name, text in scene_names(found).items():
+        click.echo(f"\n# {name}\n{text}")
+    for path in write(found, output) if output else ():
+        click.echo(f"written to {path}")
+    if found.failing:
+        raise PartError(failure_line(found))
 
 
 def main() -> None:

@@ -1,5 +1,11 @@
 """Parts made with typical numbers, so that every installed part can be tried without being known."""
 
+import atexit
+import shutil
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, ClassVar
 
 import attrs
@@ -18,6 +24,16 @@ _BY_NAME: dict[str, Any] = {
 _BY_UNIT: dict[str, Any] = {
     "1/s": 2.0, "um": 4e-5, "1/um": 100.0, "1/um^2": 100.0, "pN": 10.0, "pN/um": 1e4, "pN um": THERMAL_ENERGY, "s": 0.1,
 }  # fmt: skip
+
+_SAMPLES: dict[str, Sequence[Mapping[str, Any]]] = {
+    "pattern": (
+        {"kind": "stripes", "period": 7.0, "angle": 20.0, "low": 11.3},
+        {"kind": "checkerboard", "period": 3.0, "angle": -40.0},
+        {"kind": "gradient", "start": -300.0, "end": 2000.0, "angle": 100.0, "low": 0.3},
+        {"kind": "mask", "image": "grey", "pixel": 1.7, "outside": "repeat", "low": 250.1},
+        {"kind": "mask", "image": "grey", "pixel": 1.7, "outside": "low"},
+    )
+}
 
 
 @frozen(kw_only=True)
@@ -43,6 +59,8 @@ class Everywhere:
 def typical(made: Any, **given: Any) -> Any:
     """Make a part with its defaults, and with typical numbers for parameters that have none.
 
+    Parameters that name a file are given one: a picture of grey dots.
+
     Parameters
     ----------
     made
@@ -59,4 +77,26 @@ def typical(made: Any, **given: Any) -> Any:
         for field in attrs.fields(made)
         if field.init and field.default is attrs.NOTHING
     }
-    return made(**(chosen | given))
+    files = {field.alias for field in attrs.fields(made) if "file" in field.metadata} & given.keys()
+    return made(**(chosen | given | {name: str(_grey()) for name in files}))
+
+
+def samples_of(made: Any) -> Sequence[Mapping[str, Any]]:
+    """Give the sets of parameters that a part is tried with: its own class variable ``samples``, if it has one.
+
+    A part whose parameters have defaults, or may be any number of their unit, needs none.
+    """
+    own: Sequence[Mapping[str, Any]] = getattr(made, "samples", _SAMPLES.get(made.name, ({},)))
+    return own
+
+
+@lru_cache(maxsize=1)
+def _grey() -> Path:
+    """Draw a picture of grey dots, once a process."""
+    from matplotlib import image
+
+    folder = mkdtemp(prefix="mpad-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    path = Path(folder) / "grey.png"
+    image.imsave(path, np.random.Generator(np.random.Philox(1)).random((400, 300)), cmap="gray")
+    return path

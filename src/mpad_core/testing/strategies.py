@@ -1,5 +1,6 @@
 """Hypothesis strategies: configurations of spheres, loads, lengths."""
 
+import os
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -14,12 +15,17 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 _CELL = 5.0  # side of the lattice that keeps spheres of radius 2 at most apart
 _JITTER = 0.4
+_STEEP = 0.6  # of a chain's steps: with radii to 2:1 the next but one keeps a tenth of a radius away
+_MORE = float(os.environ.get("MPAD_EXAMPLES", "1"))  # times the number of examples of every law
 
 
 def tried(number: int) -> Callable[[F], F]:
-    """Try a law on so many examples, the same ones every time; contracts are inherited, hence run by many classes."""
+    """Try a law on so many examples, the same ones every time; contracts are inherited, hence run by many classes.
+
+    The environment's ``MPAD_EXAMPLES`` multiplies the number.
+    """
     decorate: Callable[[F], F] = settings(
-        max_examples=number,
+        max_examples=max(1, round(number * _MORE)),
         deadline=None,
         derandomize=True,
         database=None,
@@ -62,6 +68,49 @@ def configurations(
         else:
             centres[i, 2] += 2.5 + _JITTER
     return Configuration(centres=centres, radii=radii)
+
+
+def chain(radii: Array, gaps: Array, directions: Array, rises: Array) -> Configuration:
+    """Place spheres in a chain above the wall.
+
+    Parameters
+    ----------
+    radii, gaps : (N,)
+        And the gap of each to the one before, of the first to the wall, over the smaller radius.
+    directions : (N,)
+        Of each from the one before, radians from x; -0.5 to 0.5: no chain comes back to itself.
+    rises : (N,)
+        0: from the one before as steeply down as chains and the wall allow, 1: up.
+    """
+    centres = np.array([[0.0, 0.0, radii[0] * (1 + gaps[0])]])
+    for i in range(1, len(radii)):
+        reach = radii[i - 1] + radii[i] + min(radii[i - 1], radii[i]) * gaps[i]
+        lowest = max(radii[i] * (1 + gaps.min()) - centres[-1, 2], -_STEEP * reach)
+        rise = lowest + (_STEEP * reach - lowest) * rises[i]
+        across = np.sqrt(reach**2 - rise**2)
+        step = [across * np.cos(directions[i]), across * np.sin(directions[i]), rise]
+        centres = np.vstack([centres, centres[-1] + step])
+    return Configuration(centres=centres, radii=radii)
+
+
+@st.composite
+def chains(draw: st.DrawFn, fewest: int = 2, most: int = 4, smallest_gap: float = 0.05) -> Configuration:
+    """Draw spheres in a chain, gaps of neighbours and to the wall from the smallest to three radii."""
+    count, shares = draw(st.integers(fewest, most)), st.tuples(*[numbers(0.0, 1.0)] * 4)
+    drawn = np.array([draw(shares) for _ in range(count)])
+    return chain_of(drawn, smallest_gap)
+
+
+def chain_of(shares: Array, smallest_gap: float) -> Configuration:
+    """Place a chain by four numbers in (0, 1) for each sphere (N, 4)."""
+    radii, gaps = 0.7 * 2.0 ** shares[:, 0], smallest_gap * (3.0 / smallest_gap) ** shares[:, 1]
+    return chain(radii, gaps, shares[:, 2] - 0.5, shares[:, 3])
+
+
+def some_chains(number: int, smallest_gap: float = 0.05) -> list[Configuration]:
+    """Give a fixed sample of chains of two to four spheres."""
+    draws = np.random.Generator(np.random.Philox(3))
+    return [chain_of(draws.uniform(size=(2 + i % 3, 4)), smallest_gap) for i in range(number)]
 
 
 def crowd(count: int, unequal: bool = True) -> Configuration:

@@ -56,10 +56,13 @@ class CdlBiem:
     name: ClassVar[str] = "cdl-biem"
     traits: ClassVar[SolverTraits] = SolverTraits(
         lubrication=True,
-        # free motion of two cells above the wall, gaps from 1e-3 radii, at worst (docs/accuracy.md)
-        levels=tuple(
-            AccuracyLevel(parameters=(("accuracy", x),), error=error)
-            for x, error in ((1e-2, 1e-2), (1e-3, 1.5e-3), (1e-4, 4e-4), (1e-6, 3e-5))
+        levels=(
+            # chains of two to four spheres of radii to 2:1 at the wall, gaps of 0.05 and more, in shear, under weights
+            # and under forces, against 1e-5: 1.3e-2, 6e-4 and 3.4e-4 at worst; at gaps of 1e-3 1.9e-2, 2.9e-3, 2.1e-3
+            AccuracyLevel(parameters=(("accuracy", 1e-2),), error=2e-2),
+            AccuracyLevel(parameters=(("accuracy", 1e-3),), error=1e-3),
+            AccuracyLevel(parameters=(("accuracy", 1e-4),), error=5e-4),
+            AccuracyLevel(parameters=(("accuracy", 1e-6),), error=5e-5),
         ),
     )
 
