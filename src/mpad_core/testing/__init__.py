@@ -15,7 +15,8 @@ except ModuleNotFoundError as error:
     raise ModuleNotFoundError(f"{error}; install mpad-core[testing]", name=error.name) from error
 
 _ROOMS = (
-    "bonds", "claims", "energy", "exact", "fluctuating", "forces", "honesty", "invariance", "mobility", "solving", "surfaces",
+    "between", "bonds", "claims", "energy", "exact", "fluctuating", "forces", "honesty", "invariance", "mobility",
+    "solving", "surfaces",
 )  # fmt: skip
 pytest.register_assert_rewrite(*(f"{__name__}.{room}" for room in _ROOMS))  # before they are imported
 

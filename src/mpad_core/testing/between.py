@@ -9,7 +9,7 @@ from mpad_core.arrays import Array
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion, Setting
 from mpad_core.testing.asking import AskedSolver, relative
-from mpad_core.testing.claims import check
+from mpad_core.testing.claims import check, withhold
 from mpad_core.testing.invariance import WALLS
 from mpad_core.testing.strategies import chains, some_chains, some_loads, tried
 
@@ -61,9 +61,13 @@ class Beside(AskedSolver):
         return max(self.tolerance, 10 * float(getattr(self.other, "tolerance", 0.0)))
 
     def _reported(self, mine: Motion, theirs: Motion, times: float) -> float | None:
-        """Give so many times the sum of what both report; None if one reports that it may be wrong by its own size."""
+        """Give so many times the sum of what both report; None if that is as large as the answer, or one report is."""
         errors = mine.report.error, theirs.report.error
-        return None if max(errors) >= self.worthless else times * sum(errors) + self._rounding()
+        allowed = times * sum(errors) + self._rounding()
+        if max(errors) < self.worthless and allowed < 1:
+            return allowed
+        withhold("what they report leaves room for any answer")
+        return None
 
 
 class BesideContract(Beside):
@@ -77,7 +81,12 @@ class BesideContract(Beside):
         for mine, theirs, radii in self._answers(wall, at, seed):
             allowed = self._reported(mine, theirs, self.farthest)
             if allowed is not None:
-                check("solvers never differ by far more than reported", "cross-check", allowed, _apart(mine, theirs, radii))
+                check(
+                    "solvers never differ by far more than reported",
+                    "cross-check",
+                    allowed,
+                    _apart(mine, theirs, radii),
+                )
 
     @WALLS
     def test_agree_in_nine_of_ten_as_they_report(self, wall: bool) -> None:
@@ -87,9 +96,8 @@ class BesideContract(Beside):
             for mine, theirs, radii in self._answers(wall, at, i):
                 allowed = self._reported(mine, theirs, self.usual)
                 kept += [] if allowed is None else [_apart(mine, theirs, radii) <= allowed]
-        if not kept:
-            pytest.skip("one of them reports that it may be wrong by its own size")
-        check("solvers differ as reported in nine of ten cases", "cross-check", 0.1, 1 - float(np.mean(kept)))
+        if kept:
+            check("solvers differ as reported in nine of ten cases", "cross-check", 0.1, 1 - float(np.mean(kept)))
 
     @WALLS
     @given(at=chains(), seed=st.integers(0, 1000))
@@ -123,9 +131,14 @@ class LevelContract(Beside):
     @given(at=chains(), seed=st.integers(0, 1000))
     @tried(4 * _EXAMPLES)
     def test_level_is_as_good_as_claimed(self, wall: bool, at: Configuration, seed: int) -> None:
-        """In shear, alone and with a weight as strong as it, two to four spheres at gaps from a twentieth of a radius move as claimed."""
+        """In shear, free and under weights as strong, spheres at gaps from a twentieth of a radius move as claimed."""
         if self.claimed is None:
             pytest.skip("parameters without a claim")
         for mine, theirs, radii in self._answers(wall, at, seed)[:2]:
             allowed = self.claimed + (self.other_claimed or 0.0)
-            check("a level is as good as claimed", "the finest solver", allowed, relative(mine.velocity, theirs.velocity, radii))
+            check(
+                "a level is as good as claimed",
+                "the finest solver",
+                allowed,
+                relative(mine.velocity, theirs.velocity, radii),
+            )

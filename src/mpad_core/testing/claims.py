@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from attrs import frozen
+from attrs import define, field, frozen
 
 
 @frozen(kw_only=True)
@@ -50,13 +50,29 @@ class Claim:
             raise AssertionError(str(self))
 
 
-_STATED: ContextVar[list[Claim] | None] = ContextVar("stated", default=None)
+@define
+class Stated:
+    """What a law has stated.
+
+    Attributes
+    ----------
+    claims
+        In the order in which they were stated, one that fails last.
+    withheld
+        Why a claim was not stated of some examples.
+    """
+
+    claims: list[Claim] = field(factory=list)
+    withheld: list[str] = field(factory=list)
+
+
+_STATED: ContextVar[Stated | None] = ContextVar("stated", default=None)
 
 
 @contextmanager
-def collected() -> Iterator[list[Claim]]:
-    """Collect the claims that are stated inside, those that fail among them; what `mpad validate` lists."""
-    stated: list[Claim] = []
+def collected() -> Iterator[Stated]:
+    """Collect what is stated inside; what `mpad validate` lists."""
+    stated = Stated()
     token = _STATED.set(stated)
     try:
         yield stated
@@ -64,10 +80,17 @@ def collected() -> Iterator[list[Claim]]:
         _STATED.reset(token)
 
 
+def withhold(reason: str) -> None:
+    """Say why a claim is not stated of an example; a law that states none at all was not asked."""
+    listening = _STATED.get()
+    if listening is not None:
+        listening.withheld.append(reason)
+
+
 def check(claim: str, source: str, expected: float, found: float) -> None:
     """State a claim and check it at once; see `Claim`."""
     stated = Claim(claim=claim, source=source, expected=float(expected), found=float(found))
     listening = _STATED.get()
     if listening is not None:
-        listening.append(stated)
+        listening.claims.append(stated)
     stated.check()

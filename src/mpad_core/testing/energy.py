@@ -43,7 +43,7 @@ class EnergyContract(AskedSolver):
         one, two = (self.motion(setting, at, loads).velocity for loads in (first, second))
         # in units in which a lone sphere answers unit loads with unit velocities, as `apart` compares matrices
         size = np.linalg.norm(first / units) * np.linalg.norm(second / units)
-        found = abs(float((second * one).sum() - (first * two).sum())) / size
+        found = float(abs((second * one).sum() - (first * two).sum()) / size)
         check("two loads are reciprocal", "reciprocal theorem, Lorentz 1896", self.tolerance, found)
 
     @WALLS
@@ -59,9 +59,13 @@ class EnergyContract(AskedSolver):
         push[:, :3] = [line, -line]
         speeds = []
         for gap in _GAPS * reduced:
-            at = spot.moved(np.array([np.zeros(3), spot.centres[0] - spot.centres[1] + line * (spot.radii.sum() + gap)]))
+            at = spot.moved(
+                np.array([np.zeros(3), spot.centres[0] - spot.centres[1] + line * (spot.radii.sum() + gap)])
+            )
             speeds.append(float((self.motion(setting, at, push).velocity * push).sum()))
-        self._check_slower("spheres", np.array(speeds) * 6 * np.pi * setting.viscosity * reduced)
+        self._check_slower(
+            "spheres", "Jeffrey & Onishi 1984", np.array(speeds) * 6 * np.pi * setting.viscosity * reduced
+        )
 
     def test_squeezing_at_the_wall_gets_harder(self) -> None:
         """A sphere pushed to the wall approaches it the more slowly the closer it is."""
@@ -72,11 +76,13 @@ class EnergyContract(AskedSolver):
         for gap in _GAPS * radius:
             at = Configuration(centres=spot.centres * [1, 1, 0] + [0, 0, radius + gap], radii=[radius], wall_gaps=[gap])
             speeds.append(-float(self.motion(setting, at, push).velocity[0, 2]))
-        self._check_slower("a sphere and the wall", np.array(speeds) * 6 * np.pi * setting.viscosity * radius)
+        self._check_slower(
+            "a sphere and the wall", "Brenner 1961", np.array(speeds) * 6 * np.pi * setting.viscosity * radius
+        )
 
-    def _check_slower(self, who: str, speeds: Array) -> None:
+    def _check_slower(self, who: str, source: str, speeds: Array) -> None:
         """Check speeds of approach, in units of those without interaction, over the gaps from wide to narrow."""
-        check(f"squeezing {who} gets harder", "Brenner 1961", self.tolerance, float(np.diff(speeds).max()))
+        check(f"squeezing {who} gets harder", source, self.tolerance, float(np.diff(speeds).max()))
         if self.solver.traits.lubrication:
             check(f"{who} in contact do not approach", "Reynolds 1886", _CLOSED * _GAPS[-1], float(speeds[-1]))
 

@@ -12,7 +12,7 @@ from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.numerics.pair_functions import PairFunctions, pair_resistance, pair_strain_load
 from mpad_core.numerics.wall_functions import wall_mobility, wall_shear_load
 from mpad_core.testing.asking import AskedSolver, paired, relative, several, single
-from mpad_core.testing.claims import check
+from mpad_core.testing.claims import check, withhold
 from mpad_core.testing.invariance import WALLS
 from mpad_core.testing.strategies import numbers, some_loads, tried
 
@@ -50,10 +50,11 @@ def exact_pair(setting: Setting, at: Configuration, loads: Array) -> Array:
     strain[0, 2] = strain[2, 0] = setting.shear_rate / 2
     pair_resistance(functions, (two - one) / distance, a, b, setting.viscosity, resistance)
     pair_strain_load(functions, (two - one) / distance, a, setting.viscosity, strain, load)
-    moved = np.linalg.solve(resistance, loads[order].ravel() + load).reshape(2, 6)
+    answer = np.linalg.solve(resistance, loads[order].ravel() + load)
+    moved: Array = np.asarray(answer, dtype=np.float64).reshape(2, 6)
     moved[:, 0] += setting.shear_rate * at.centres[order, 2]
     moved[:, 4] += setting.shear_rate / 2
-    return moved[np.argsort(order)]
+    return np.asarray(moved[np.argsort(order)], dtype=np.float64)
 
 
 @st.composite
@@ -95,6 +96,8 @@ class ExactContract(AskedSolver):
         """Check an error against the one that the solver has reported."""
         if reported < self.worthless:
             check(claim, source, self.shortfall * reported + self.tolerance, error)
+        else:
+            withhold(f"reports that it may be wrong by {reported:.2g}")
 
     @WALLS
     @pytest.mark.parametrize("gap", [1e-4, 1e-2, 0.3, 3.0, 100.0])

@@ -33,7 +33,10 @@ class HonestyContract(ExactContract):
 
         A solver that always says that it may be wrong by half could not be found wrong by any of these laws.
         """
-        setting, at = self.setting(wall), self.fitting(at, lambda other: _easy(other) and len(other.radii) == len(at.radii))
+        setting, at = (
+            self.setting(wall),
+            self.fitting(at, lambda other: _easy(other) and len(other.radii) == len(at.radii)),
+        )
         loads = 100.0 * np.ones((len(at.radii), 6))  # as strong as the flow
         reported = max(self.motion(setting, at, load).report.error for load in (0 * loads, loads))
         check("the claim says something", "definition", np.nextafter(self.worthless, 0), reported)

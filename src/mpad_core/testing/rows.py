@@ -6,7 +6,7 @@ from typing import Any
 
 from attrs import evolve, field, frozen
 
-from mpad_core.testing.claims import Claim
+from mpad_core.testing.claims import Claim, Stated
 
 HOLDS, FAILS, LEFT_OUT = "holds", "FAILS", "not asked"
 
@@ -49,16 +49,18 @@ class Told:
     rows: tuple[Row, ...] = field(default=())
     scene: str = ""  # text of a scene that reproduces a failure
 
-    def with_claims(self, stated: Iterable[Claim]) -> "Told":
-        """Take up the claims that a law has stated, the worst of each."""
+    def with_claims(self, stated: Stated) -> "Told":
+        """Take up the claims that a law has stated, the worst of each; it was not asked if it has withheld all."""
         grouped: dict[tuple[str, str], list[Claim]] = {}
-        for claim in stated:
+        if stated.withheld and not stated.claims:
+            return evolve(self, rows=(self._whole(verdict=LEFT_OUT, reason=stated.withheld[0]),))
+        for claim in stated.claims:
             grouped.setdefault((claim.claim, claim.source), []).append(claim)
         return evolve(self, rows=tuple(_worst(claims) for claims in grouped.values()) or (self._whole(),))
 
     def _whole(self, **said: Any) -> Row:
         """Give the row of a law that states no number."""
-        return Row(claim=self.meaning, source="interface", examples=1, **said)
+        return Row(claim=self.meaning.rstrip("."), source="interface", examples=1, **said)
 
     def left_out(self, reason: str) -> "Told":
         """Say that a law was not asked; what it had stated before stays."""

@@ -8,19 +8,20 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 from attrs import field, frozen
 
 from mpad_core.interfaces.errors import InputError, PartError
+from mpad_core.testing import suite
 from mpad_core.testing.report import Validation, json_text
 from mpad_core.testing.rows import Told, told_of
-from mpad_core.testing.suite import __file__ as _SUITE
 from mpad_core.testing.suite.cases import KINDS, Chosen
 from mpad_core.testing.suite.plugin import TOLD
 
 _WORKERS = 2
-_HOME = Path(_SUITE).parent
+_HOME = Path(suite.__file__).parent
 _QUIET = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": "", "PYTEST_PLUGINS": ""}
 
 
@@ -75,7 +76,9 @@ class _Listener:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Take up what a law has told."""
-        told = [told_of(value) for name, value in report.user_properties if name == TOLD]
+        told = [told_of(value) for name, value in _properties(report) if name == TOLD]
+        if report.failed and not told:  # a process has died
+            self.broken.append(f"{report.nodeid}: {report.longreprtext}")
         self.told += told[-1:] if report.when == "call" or not report.passed else []
         if told and sys.stderr is not None and sys.stderr.isatty():
             print(f"\r{len(self.told)} laws asked", end="", file=sys.stderr, flush=True)
@@ -84,6 +87,10 @@ class _Listener:
         """Take up what cannot even be collected."""
         if report.failed:
             self.broken.append(str(report.longrepr))
+
+
+def _properties(report: pytest.TestReport) -> list[tuple[str, Any]]:
+    return [(str(name), value) for name, value in report.user_properties]
 
 
 def validate(asked: Asked) -> Validation:
@@ -136,7 +143,8 @@ def failure_line(validation: Validation) -> str:
     """Name in one line the parts and claims that fail; empty if none does."""
     named: dict[str, list[str]] = {}
     for told, row in validation.failing:
-        named.setdefault(f"{told.kind} {told.part}", []).append(f"{row.claim} ({row.reason})" if row.reason else row.claim)
+        claim = f"{row.claim} ({row.reason})" if row.reason else row.claim
+        named.setdefault(f"{told.kind} {told.part}", []).append(claim)
     parts = [f"{part}: {', '.join(dict.fromkeys(claims))}" for part, claims in named.items()]
     return f"claims that fail: {'; '.join(parts)}" if parts else ""
 
@@ -154,5 +162,6 @@ def write(validation: Validation, path: Path) -> list[Path]:
         try:
             file.write_text(text, encoding="utf-8")
         except OSError as error:
-            raise InputError(f"{file}: cannot be written: {error.strerror}; name a file in a folder that exists") from error
+            what = f"cannot be written: {error.strerror}; name a file in a folder that exists"
+            raise InputError(f"{file}: {what}") from error
     return list(texts)

@@ -13,7 +13,7 @@ from attrs import asdict
 
 from mpad_core.physics.asking import one_line
 from mpad_core.testing.asking import AskedSolver, Place
-from mpad_core.testing.claims import Claim, collected
+from mpad_core.testing.claims import Stated, collected
 from mpad_core.testing.reproducing import place_of, scene_text
 from mpad_core.testing.rows import Told
 from mpad_core.testing.suite.cases import KINDS, Case, Chosen, beside, cases, finest, of_scene, parts
@@ -102,7 +102,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
     """Put what the law has told into the report of its call, or of what has kept it from being called."""
     report = yield
     if call.when == "call" or (call.when == "setup" and not report.passed):
-        stated = getattr(item, "mpad_stated", [])
+        stated = getattr(item, "mpad_stated", Stated())
         report.user_properties.append((TOLD, asdict(_told(item, call, stated, report))))
     return report
 
@@ -115,7 +115,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
         yield
 
 
-def _told(item: Any, call: "pytest.CallInfo[None]", stated: list[Claim], report: Any) -> Told:
+def _told(item: Any, call: "pytest.CallInfo[None]", stated: Stated, report: Any) -> Told:
     """Say what a law has told of a part."""
     kind, part, first = _asked(item)
     law, _, _ = item.originalname.removeprefix("test_").partition("[")
@@ -126,9 +126,9 @@ def _told(item: Any, call: "pytest.CallInfo[None]", stated: list[Claim], report:
     if report.skipped:
         return told.left_out(_reason(call))
     fault = call.excinfo.value if call.excinfo else None
-    broken = bool(stated) and isinstance(fault, AssertionError) and str(fault) == str(stated[-1])
+    broken = bool(stated.claims) and isinstance(fault, AssertionError) and str(fault) == str(stated.claims[-1])
     reason = "" if broken else one_line(fault) if fault is not None else "failed"
-    return told.failed(stated[-1] if broken else None, reason, _reproduced(item, first, told, reason, stated))
+    return told.failed(stated.claims[-1] if broken else None, reason, _reproduced(item, first, told, reason, stated))
 
 
 def _asked(item: Any) -> tuple[str, str, Case | None]:
@@ -149,10 +149,10 @@ def _reason(call: "pytest.CallInfo[None]") -> str:
     return str(getattr(call.excinfo.value, "msg", call.excinfo.value)) if call.excinfo else "skipped"
 
 
-def _reproduced(item: Any, case: Case | None, told: Told, reason: str, stated: list[Claim]) -> str:
+def _reproduced(item: Any, case: Case | None, told: Told, reason: str, stated: Stated) -> str:
     """Write the scene at which a solver's law has failed; empty for other parts, and where it was asked nowhere."""
     instance = item.instance
     if case is None or not isinstance(instance, AskedSolver) or instance.asked is None:
         return ""
-    says = reason or str(stated[-1])
+    says = reason or str(stated.claims[-1])
     return scene_text(case, instance.asked, f"{told.part}: {told.law}: {told.meaning}", says)
