@@ -59,13 +59,11 @@ class EnergyContract(AskedSolver):
         push[:, :3] = [line, -line]
         speeds = []
         for gap in _GAPS * reduced:
-            at = spot.moved(
-                np.array([np.zeros(3), spot.centres[0] - spot.centres[1] + line * (spot.radii.sum() + gap)])
-            )
+            second = spot.centres[0] + line * (spot.radii.sum() + gap)
+            at = spot.moved(np.array([np.zeros(3), second - spot.centres[1]]))
             speeds.append(float((self.motion(setting, at, push).velocity * push).sum()))
-        self._check_slower(
-            "spheres", "Jeffrey & Onishi 1984", np.array(speeds) * 6 * np.pi * setting.viscosity * reduced
-        )
+        unit = 1 / (6 * np.pi * setting.viscosity * reduced)
+        self._check_slower("spheres", "Jeffrey & Onishi 1984", np.array(speeds) / unit)
 
     def test_squeezing_at_the_wall_gets_harder(self) -> None:
         """A sphere pushed to the wall approaches it the more slowly the closer it is."""
@@ -76,9 +74,8 @@ class EnergyContract(AskedSolver):
         for gap in _GAPS * radius:
             at = Configuration(centres=spot.centres * [1, 1, 0] + [0, 0, radius + gap], radii=[radius], wall_gaps=[gap])
             speeds.append(-float(self.motion(setting, at, push).velocity[0, 2]))
-        self._check_slower(
-            "a sphere and the wall", "Brenner 1961", np.array(speeds) * 6 * np.pi * setting.viscosity * radius
-        )
+        unit = 1 / (6 * np.pi * setting.viscosity * radius)
+        self._check_slower("a sphere and the wall", "Brenner 1961", np.array(speeds) / unit)
 
     def _check_slower(self, who: str, source: str, speeds: Array) -> None:
         """Check speeds of approach, in units of those without interaction, over the gaps from wide to narrow."""

@@ -20,8 +20,8 @@ force laws, whoever wrote them. A law draws its examples (Hypothesis), the same 
 
 `--solver NAME`, `--bond`, `--surface`, `--force` ask these parts only; `--examples 10` takes ten times as many.
 If a claim fails, the command ends with code 70, names part and claim, and prints a scene with the smallest example at
-which a solver's law has failed, which `-o` also writes beside the JSON; `mpad validate --at SCENE` asks all laws of that
-solver there again. [Parts](plugins.md#proof) says how to validate a part of your own.
+which a solver's law has failed, which `-o` also writes beside the JSON; `mpad validate --at SCENE` asks all laws of
+that solver there again. [Parts](plugins.md#proof) says how to validate a part of your own.
 """
 _KINDS = {"solver": "Solvers", "bond": "Bond models", "surface": "Surfaces", "force": "Force laws"}
 _RULES = """\
