@@ -75,7 +75,7 @@ class BesideContract(Beside):
 
     @WALLS
     @given(at=chains(), seed=st.integers(0, 1000))
-    @tried(_EXAMPLES)
+    @tried(_EXAMPLES, shrink=False)  # there are many pairs, and a solver that is wrong fails beside each other one
     def test_agree_as_they_report(self, wall: bool, at: Configuration, seed: int) -> None:
         """Reports are estimates, not bounds; but two solvers never differ by ten times the sum of what they report."""
         for mine, theirs, radii in self._answers(wall, at, seed):
@@ -101,7 +101,7 @@ class BesideContract(Beside):
 
     @WALLS
     @given(at=chains(), seed=st.integers(0, 1000))
-    @tried(_EXAMPLES)
+    @tried(_EXAMPLES, shrink=False)  # there are many pairs, and a solver that is wrong fails beside each other one
     def test_agree_as_their_levels_claim(self, wall: bool, at: Configuration, seed: int) -> None:
         """In shear, under weights and under forces they differ by no more than the sum of their levels' errors."""
         if self.claimed is None or self.other_claimed is None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 
 from mpad_core.arrays import Array
@@ -19,15 +19,17 @@ _STEEP = 0.6  # of a chain's steps: with radii to 2:1 the next but one keeps a t
 _MORE = float(os.environ.get("MPAD_EXAMPLES", "1"))  # times the number of examples of every law
 
 
-def tried(number: int) -> Callable[[F], F]:
+def tried(number: int, shrink: bool = True) -> Callable[[F], F]:
     """Try a law on so many examples, the same ones every time; contracts are inherited, hence run by many classes.
 
-    The environment's ``MPAD_EXAMPLES`` multiplies the number.
+    The environment's ``MPAD_EXAMPLES`` multiplies the number. An example that fails is shrunk to the smallest that
+    does, unless that would cost more than it tells.
     """
     decorate: Callable[[F], F] = settings(
         max_examples=max(1, round(number * _MORE)),
         deadline=None,
         derandomize=True,
+        phases=[phase for phase in Phase if shrink or phase not in (Phase.shrink, Phase.explain)],
         database=None,
         suppress_health_check=[HealthCheck.differing_executors, HealthCheck.too_slow],
     )
