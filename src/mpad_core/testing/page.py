@@ -49,7 +49,7 @@ def _of_kind(validation: Validation, kind: str) -> Iterator[str]:
     if kind == "solver":
         yield _RULES
     yield from _table(("law", "what it asks", "source"), _meanings(told))
-    alone = [one for one in told if " beside " not in one.part]
+    alone = [one for one in told if " beside " not in one.part and one.law != "loads"]
     yield from _found(alone, lambda one: one.part)
     beside = [one for one in told if " beside " in one.part]
     if beside:
