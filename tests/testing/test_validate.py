@@ -13,7 +13,7 @@ import pytest
 from mpad_core.scene.files import parse_scene
 from mpad_core.testing.report import from_json, json_text, table_lines
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.timeout(600)
 
 WRONG = Path(__file__).parent / "wrong_parts"
 SOLVERS = {
@@ -68,6 +68,7 @@ def failing(folder: Path) -> dict[str, list[str]]:
     return found
 
 
+@pytest.mark.long
 def test_wrong_parts_are_found_by_name(wrong: Any) -> None:
     folder, _, done = wrong
     assert done.returncode == 70, done.stderr
@@ -82,6 +83,7 @@ def test_wrong_parts_are_found_by_name(wrong: Any) -> None:
     assert any("ZeroDivisionError: no more than two" in each for each in found["raises"])
 
 
+@pytest.mark.long
 def test_the_right_one_is_right(wrong: Any) -> None:
     """What the wrong ones are wrapped in is not what is found."""
     folder, _, _ = wrong
@@ -92,6 +94,7 @@ def test_the_right_one_is_right(wrong: Any) -> None:
     assert "two spheres are as good as claimed" not in " ".join(found["pads"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "law"),
     [
@@ -114,10 +117,11 @@ def test_a_scene_reproduces_the_failure(wrong: Any, name: str, law: str) -> None
     assert SOLVERS[name] in again.stderr
 
 
+@pytest.mark.slow
 def test_isolated_from_end_to_end(tmp_path: Path) -> None:
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --no-such-option\n")  # the user's own, not ours
     (tmp_path / "conftest.py").write_text("raise RuntimeError('not ours')\n")
-    done = validate(tmp_path, dict(os.environ), "--solver", "isolated", "--examples", "0.5", "-o", "found.json")
+    done = validate(tmp_path, dict(os.environ), "--solver", "isolated", "--examples", "0.2", "-o", "found.json")
     assert done.returncode == 0, done.stderr
     assert "two spheres are as good as claimed" in done.stdout
     assert "FAILS" not in done.stdout
@@ -126,6 +130,7 @@ def test_isolated_from_end_to_end(tmp_path: Path) -> None:
     assert list(table_lines(found)) == done.stdout.splitlines()[: len(list(table_lines(found)))]
 
 
+@pytest.mark.slow
 def test_what_is_not_installed_is_said(tmp_path: Path) -> None:
     done = validate(tmp_path, dict(os.environ), "--solver", "isolate")
     assert done.returncode == 2
