@@ -44,7 +44,7 @@ def asking(solver: Any) -> MobilitySolverContract:
 
 LAWS: list[tuple[str, str, Callable[[MobilitySolverContract], None]]] = [
     ("WrongSign", "two spheres are as good", lambda c: one(c.test_two_spheres_are_as_good_as_claimed, at=PAIR)),
-    ("WrongSign", "squeezing spheres", lambda c: one(c.test_squeezing_spheres_gets_harder, wall=False, ratio=1, angle=0)),
+    ("WrongSign", "squeezing", lambda c: one(c.test_squeezing_spheres_gets_harder, wall=False, ratio=1, angle=0)),
     ("WrongDrag", "a lone sphere is as good", lambda c: c.test_lone_sphere_is_as_good_as_claimed(True, 0.3)),
     ("WrongSymmetry", "mobility is symmetric", lambda c: one(c.test_symmetric, wall=True, at=THREE)),
     ("WrongSymmetry", "two loads are reciprocal", lambda c: one(c.test_reciprocal, wall=True, at=THREE, seed=1)),
