@@ -104,10 +104,14 @@ class Motion:
 
 @frozen(kw_only=True)
 class AccuracyLevel:
-    """One setting of a solver and the error it claims there."""
+    """One setting of a solver and the error it claims there.
+
+    A ``reference`` is there to compare others with, and dearer than runs can bear.
+    """
 
     parameters: tuple[tuple[str, object], ...]
     error: float
+    reference: bool = False
 
 
 @frozen(kw_only=True)

@@ -17,9 +17,8 @@ from mpad_core.physics.levels import Level, installed_levels, level_named, relat
 from mpad_core.physics.questions import unit_load
 from mpad_core.plugins.hookspecs import hookimpl
 
-_WORTH_TRYING = 1.6  # times less than the rung before is what the next one claims
+_WORTH_TRYING = 1.6  # times less than the rung before is what the next one claims; those as near may err alike
 _DOUBT = 2.0  # by which estimates that nothing has been compared with may fall short
-_INDEPENDENT = 3.5  # claims so many times apart are of solvers that do not err alike
 
 
 @frozen(kw_only=True)
@@ -71,7 +70,7 @@ class Auto:
         InputError
             If one of `levels` is not installed.
         """
-        chosen = [level_named(label) for label in self.levels] if self.levels else _worth_trying()
+        chosen = [level_named(label) for label in self.levels] if self.levels else _worth_trying(self.accuracy)
         trusts = self.trust or (1.0,) * len(chosen)
         return tuple(
             Rung(label=level.label, solver=level.solver, claim=level.claim, trust=trust)
@@ -108,10 +107,15 @@ class Auto:
         return drift
 
 
-def _worth_trying() -> list[Level]:
-    """Thin out the installed levels, so that each claims clearly less than the one before; the best one stays."""
+def _worth_trying(accuracy: float) -> list[Level]:
+    """Thin out the installed levels, so that each claims clearly less than the one before.
+
+    References are left out unless they alone claim what is asked for.
+    """
     found: list[Level] = []
     for level in installed_levels():
+        if level.reference and found and found[-1].claim <= accuracy:
+            continue
         if not found or level.claim * _WORTH_TRYING <= found[-1].claim:
             found.append(level)
     return found
@@ -145,7 +149,7 @@ class _Plan:
                 refusal = refused
                 continue
             found = _Prepared(solver=rung.solver, inner=inner)
-            coarser = [velocity for claim, velocity in before if claim >= _INDEPENDENT * rung.claim]
+            coarser = [velocity for claim, velocity in before if claim >= _WORTH_TRYING * rung.claim]
             agreed = any(self._agree(velocity, motion.velocity, at.radii) for velocity in coarser)
             if agreed or _DOUBT * rung.trust * motion.report.error <= self.accuracy:
                 break

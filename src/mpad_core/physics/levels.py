@@ -9,7 +9,7 @@ from attrs import evolve, frozen
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import InputError
 from mpad_core.interfaces.mobility import Laddered, MobilitySolver
-from mpad_core.interfaces.values import Configuration, Motion, Setting
+from mpad_core.interfaces.values import AccuracyLevel, Configuration, Motion, Setting
 from mpad_core.physics import asking
 from mpad_core.physics.questions import held_loads, unit_load
 from mpad_core.plugins import registry
@@ -22,6 +22,7 @@ class Level:
     name: str  # of the part
     parameters: tuple[tuple[str, object], ...]
     claim: float  # the error it claims
+    reference: bool  # there to compare others with
     solver: MobilitySolver
 
     @property
@@ -44,10 +45,17 @@ def installed_levels(names: Sequence[str] | None = None) -> tuple[Level, ...]:
     found = []
     for name in [part.name for part in registry.installed("solver")] if names is None else names:
         made = registry.load("solver", name)
-        levels = [(level.parameters, level.error) for level in made.traits.levels] or [((), np.inf)]
         if not isinstance(made(), Laddered):
-            found += [Level(name=name, parameters=p, claim=e, solver=made(**dict(p))) for p, e in levels]
+            levels = made.traits.levels or (AccuracyLevel(parameters=(), error=np.inf),)
+            found += [_level(name, made, level) for level in levels]
     return tuple(sorted(found, key=lambda level: -level.claim))
+
+
+def _level(name: str, made: type[MobilitySolver], level: AccuracyLevel) -> Level:
+    return Level(
+        name=name, parameters=level.parameters, claim=level.error, reference=level.reference,
+        solver=made(**dict(level.parameters)),
+    )  # fmt: skip
 
 
 def level_named(label: str) -> Level:

@@ -248,14 +248,13 @@ def _summary(scene: Scene, results: list[Result], wall: float) -> dict[str, Any]
     if scene.passage:
         summary["passage"] = _passage(scene, results)
     if isinstance(first.case.problem.solver, Auto):
-        summary["solver_choice"] = _choice(results)
+        summary["solver_choice"] = _choice(first.case.problem.solver, results)
     plain: dict[str, Any] = _plain(summary)
     return plain
 
 
-def _choice(results: list[Result]) -> dict[str, Any]:
+def _choice(solver: Auto, results: list[Result]) -> dict[str, Any]:
     """Describe what `auto` chose, and what it had climbed to at the end of each run."""
-    solver = results[0].case.problem.solver
     return {
         "accuracy": solver.accuracy,
         "chose": solver.levels[0],

@@ -62,7 +62,7 @@ class CdlBiem:
             AccuracyLevel(parameters=(("accuracy", 1e-2),), error=2e-2),
             AccuracyLevel(parameters=(("accuracy", 1e-3),), error=1e-3),
             AccuracyLevel(parameters=(("accuracy", 1e-4),), error=5e-4),
-            AccuracyLevel(parameters=(("accuracy", 1e-6),), error=5e-5),
+            AccuracyLevel(parameters=(("accuracy", 1e-6),), error=5e-5, reference=True),
         ),
     )
 

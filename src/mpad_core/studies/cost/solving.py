@@ -12,7 +12,8 @@ from attrs import evolve, frozen
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.mobility import MobilitySolver
-from mpad_core.physics.coupling import coupler, typical_speed
+from mpad_core.physics.couplers import coupler
+from mpad_core.physics.coupling import typical_speed
 from mpad_core.physics.levels import Level, Situation, answer, relative_error
 from mpad_core.physics.problem import Problem
 from mpad_core.studies.cost.paths import Clock

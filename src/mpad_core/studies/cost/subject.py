@@ -123,7 +123,9 @@ def own_level(scene: Scene, levels: Sequence[Level]) -> Level | None:
     solver = scene.solver.instance
     if isinstance(solver, Laddered) or any(level.solver == solver for level in levels):
         return None
-    return Level(name=scene.solver.name, parameters=_changed(scene.solver), claim=np.inf, solver=solver)
+    return Level(
+        name=scene.solver.name, parameters=_changed(scene.solver), claim=np.inf, reference=False, solver=solver
+    )
 
 
 def _changed(part: Part) -> tuple[tuple[str, object], ...]:
