@@ -66,6 +66,12 @@ def progress(
         everyone.close()
 
 
+def warn(log: RunLog, effect: str, text: str) -> None:
+    """Write a warning to the log and to standard error: in words on a terminal, elsewhere as the log's line."""
+    line = log.write("warning", effect=effect, text=text)
+    _print(sys.stderr, f"warning: {effect}: {text}\n" if sys.stderr.isatty() else line)
+
+
 @define
 class _Everyone:
     listeners: list[Progress]

@@ -7,8 +7,8 @@ from attrs import frozen
 
 from mpad_core.physics.problem import BondSpecies, Problem
 
-_SLIDING = 0.67  # speed of a cell near the wall over that of the fluid at its centre
-_HELD_FORCE, _HELD_TORQUE = 1.7005, 0.944  # force and torque in shear on a held sphere touching the wall (O'Neill 1968)
+SLIDING = 0.67  # speed of a cell near the wall over that of the fluid at its centre
+HELD_FORCE, HELD_TORQUE = 1.7005, 0.944  # force and torque in shear on a held sphere touching the wall (O'Neill 1968)
 
 
 @frozen(kw_only=True)
@@ -20,7 +20,7 @@ class Group:
     value: float
 
 
-def _squeeze(gap: float, radius: float) -> float:
+def squeeze(gap: float, radius: float) -> float:
     """Give the drag normal to the wall over Stokes', within 1 % (Bevan & Prieve, J Chem Phys 113:1228, 2000)."""
     return (6 * gap**2 + 9 * gap * radius + 2 * radius**2) / (6 * gap**2 + 2 * gap * radius)
 
@@ -29,7 +29,7 @@ def passage_time(problem: Problem, longest: float) -> float:
     """Give the time (s) in which the flow carries a cell past all others, at most the run's."""
     span = float(np.ptp(problem.start[:, 0])) + 20 * float(problem.radii.max())
     shear = abs(problem.setting.shear_rate)
-    speed = _SLIDING * shear * float(problem.radii.max())
+    speed = SLIDING * shear * float(problem.radii.max())
     return min(longest, span / speed) if speed > 0 else longest
 
 
@@ -51,7 +51,7 @@ def dimensionless_groups(problem: Problem, fluid_density: float, kT: float, long
     radius, gap = float(problem.radii[low]), float(problem.start[low, 2] - problem.radii[low])
     shear, viscosity = abs(problem.setting.shear_rate), problem.setting.viscosity
     passage = passage_time(problem, longest)
-    drag = 6 * math.pi * viscosity * radius * (_squeeze(max(gap, 1e-6 * radius), radius) if problem.setting.wall else 1)
+    drag = 6 * math.pi * viscosity * radius * (squeeze(max(gap, 1e-6 * radius), radius) if problem.setting.wall else 1)
     weight = abs(float(problem.external[low, 2]))
     reynolds = fluid_density * shear * radius**2 / viscosity
     groups = [Group(name="Re", meaning="inertia by viscosity, rho gamma a^2 / mu", value=reynolds)]
@@ -79,8 +79,8 @@ def _of_bond(species: BondSpecies, radius: float, stress: float, pull: float) ->
     length = species.rest_length
     stiffness = float(np.diff(species.model.tension(np.array([1.01, 1.02]) * length))[0] / (0.01 * length))
     stiffness = max(stiffness, 1e-300)
-    force = _HELD_FORCE * 6 * math.pi * stress * radius**2
-    torque = _HELD_TORQUE * 4 * math.pi * stress * radius**3
+    force = HELD_FORCE * 6 * math.pi * stress * radius**2
+    torque = HELD_TORQUE * 4 * math.pi * stress * radius**3
     tether = math.sqrt(radius / (2 * length)) * (force + torque / radius)
     lengths = np.array([length, length + tether / stiffness])
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""The plan of a scene in words: parts, effects with their reasons, and the dimensionless groups behind them."""
+"""The plan of a scene in words: parts, effects with their reasons, the dimensionless groups behind them, warnings."""
 
 from collections.abc import Iterator
 
@@ -8,6 +8,7 @@ from mpad_core.scene.compose import compose
 from mpad_core.scene.groups import dimensionless_groups
 from mpad_core.scene.provenance import lines
 from mpad_core.scene.spec import Part, Scene
+from mpad_core.scene.warnings import warnings_of
 from mpad_core.units import thermal_energy
 
 
@@ -41,6 +42,8 @@ def plan_lines(scene: Scene) -> Iterator[str]:
         groups = dimensionless_groups(problem, scene.fluid.density, kT, scene.stop.time)
     for group in groups:
         yield f"  {group.name:<12} {group.value:<10.3g}{group.meaning}"
+    yield "warnings:"
+    yield from [f"  {found.effect:<12} {found.text}" for found in warnings_of(scene, problem)] or ["  none"]
 
 
 def _named(part: Part) -> str:

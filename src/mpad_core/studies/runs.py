@@ -16,7 +16,7 @@ from mpad_core.physics.auto import Auto
 from mpad_core.physics.problem import Problem
 from mpad_core.records.lock import locked
 from mpad_core.records.log import RunLog
-from mpad_core.records.progress import progress
+from mpad_core.records.progress import progress, warn
 from mpad_core.records.reader import read_trajectory
 from mpad_core.records.trajectory import Trajectory
 from mpad_core.running.choosing import kept_choice, settled
@@ -26,6 +26,7 @@ from mpad_core.running.schedules import Cadence
 from mpad_core.scene.attached import files_of
 from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
+from mpad_core.scene.warnings import warnings_of
 from mpad_core.scene.writing import resolved_toml
 from mpad_core.studies.conditions import stop_conditions
 from mpad_core.studies.passage import Path, describe, free_part, path_of
@@ -109,6 +110,8 @@ def run(
         with RunLog(root / LOG) as log:
             began = time.monotonic()
             log.write("started", scene=scene.title, runs=len(todo), resume=resume, solver=scene.solver.parameters)
+            for doubt in warnings_of(scene, todo[0].problem):
+                warn(log, doubt.effect, doubt.text)
             results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
             summary = _summary(scene, results, time.monotonic() - began)
             _write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
