@@ -15,6 +15,7 @@ from mpad_core.records.checkpoint import read_checkpoint
 from mpad_core.records.log import RunLog
 from mpad_core.records.progress import Progress
 from mpad_core.records.room import NearlyFullError
+from mpad_core.running.accounting import Account, Accounts
 from mpad_core.running.initial import initial_state
 from mpad_core.running.march import Machine, make_ready, march
 from mpad_core.running.recorder import (
@@ -49,6 +50,17 @@ class Outcome:
     state: State = field(repr=False)
     ended: str  # "time", or the condition that held
     sub_step: float  # s
+    account: Account = field(repr=False)  # of what this process did of the run
+
+
+@frozen(kw_only=True)
+class _Listeners:
+    """All who hear of every outer step."""
+
+    recorder: Recorder
+    accounts: Accounts
+    signals: Signals
+    bar: Progress
 
 
 def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Progress) -> Outcome:
@@ -70,13 +82,10 @@ def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Pr
         with _named_parts(order.problem, "before step one"):
             machine = make_ready(order.problem)
             recorder, state, ended = _begin(order, machine, directory, resume, signals, log)
+        listeners = _Listeners(recorder=recorder, accounts=Accounts.of(machine), signals=signals, bar=bar)
         with _closed(recorder):
-            state, ended = _go_on(order, machine, recorder, state, ended, signals, bar)
-    return Outcome(
-        state=state,
-        ended=ended,
-        sub_step=machine.pace.sub_step,
-    )
+            state, ended = _go_on(order, listeners, state, ended)
+    return Outcome(state=state, ended=ended, sub_step=machine.pace.sub_step, account=listeners.accounts.closed())
 
 
 @contextmanager
@@ -143,21 +152,22 @@ def _prepared(machine: Machine, signals: Signals) -> State:
     return initial_state(machine, hear)
 
 
-def _go_on(
-    order: Order, machine: Machine, recorder: Recorder, state: State, ended: str, signals: Signals, bar: Progress
-) -> tuple[State, str]:
+def _go_on(order: Order, listeners: _Listeners, state: State, ended: str) -> tuple[State, str]:
     """March to the end; give the last state and why it ended."""
     if ended:
         return state, ended
+    recorder, signals = listeners.recorder, listeners.signals
     # a condition may hold already: for the first state, or for one kept just before the process died
     ended = first_that_holds(order.stop_when, order.problem, state) or ""
     kept_at, before = time.monotonic(), state
-    marching = march(machine, state, order.until)
+    marching = march(listeners.accounts.machine, state, order.until)
     next(marching)
     while not ended:
         now = f"at t = {before.time:.6g} s, step {before.step - before.zero}"
         with _named_parts(order.problem, now, "; go on with --resume"):
+            began = time.perf_counter()
             after = next(marching, None)
+            marched = time.perf_counter()
             if after is None:
                 break
             try:
@@ -165,8 +175,9 @@ def _go_on(
             except NearlyFullError:
                 recorder.keep(after)
                 raise
+            listeners.accounts.hear(before, after, marched - began, time.perf_counter() - marched)
         before = after
-        bar.update(after.time, after.step - after.zero)
+        listeners.bar.update(after.time, after.step - after.zero)
         ended = first_that_holds(order.stop_when, order.problem, after) or ""
         if signals.received:
             recorder.keep(after)

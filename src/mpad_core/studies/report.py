@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from mpad_core.studies.contributions import effect_lines
+
 
 def summary_lines(summary: dict[str, Any], directory: Path) -> Iterator[str]:
     """Yield what ``mpad run`` prints at the end."""
@@ -16,6 +18,7 @@ def summary_lines(summary: dict[str, Any], directory: Path) -> Iterator[str]:
         yield from _passage_lines(summary["passage"])
     if "solver_choice" in summary:
         yield f"solver chosen: {summary['solver_choice']['reason']}"
+    yield from effect_lines(summary)
     yield f"written to {directory}"
 
 

@@ -28,6 +28,7 @@ from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
 from mpad_core.scene.warnings import warnings_of
 from mpad_core.scene.writing import resolved_toml
+from mpad_core.studies import contributions
 from mpad_core.studies.conditions import stop_conditions
 from mpad_core.studies.passage import Path, describe, free_part, path_of
 
@@ -220,6 +221,7 @@ def _cells(result: Result) -> dict[str, Any]:
             "least_overlap_nm": 1e3 * float(np.min(z - problem.zero_overlap[i])),
             "bonds_at_end": int(state.bond_counts()[i]),
             "caught_at_s": state.caught_since[i] if np.isfinite(state.caught_since[i]) else None,
+            "effects": contributions.of_cell(result.outcome.account, i),
         }
     return described
 
@@ -229,7 +231,7 @@ def _summary(scene: Scene, results: list[Result], wall: float) -> dict[str, Any]
     summary: dict[str, Any] = {
         "title": scene.title,
         "solver": scene.solver.name,
-        "effects": {effect.name: {"on": effect.on, "why": effect.why} for effect in first.case.problem.effects},
+        "effects": contributions.described(first.case.problem, first.outcome.account),
         "bonds": {
             s.name: {"model": s.model.name, "reach": s.reach, "compression": s.compression, "on_rate_per_s": s.on_rate}
             for s in first.case.problem.species
@@ -244,6 +246,8 @@ def _summary(scene: Scene, results: list[Result], wall: float) -> dict[str, Any]
                 "ended": result.outcome.ended,
                 "time_s": result.outcome.state.time,
                 "cells": _cells(result),
+                "effects": contributions.described(result.case.problem, result.outcome.account),
+                "time_shares": contributions.spent(result.outcome.account),
             }
             for result in results
         ],
