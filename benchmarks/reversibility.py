@@ -1,7 +1,8 @@
 """Which discretisations fake a vertical drift? Prints the table of ``docs/reversibility.md``.
 
 Run as ``python benchmarks/reversibility.py [FOLDER]``; with a folder it also writes ``reversibility.csv``,
-``reversibility.json`` and ``reversibility.png`` there. Some ten minutes, nearly all of them boundary elements.
+``reversibility.json`` and ``reversibility.png`` there, and levels that the file in JSON has are not worked out again.
+Some ten minutes, nearly all of them boundary elements.
 
 The base collision of ``examples/recruitment.toml``, the first cell held, nothing but the flow: see
 `mpad_core.studies.reversibility`. Boundary elements are shown twice: as the solver has them, on a mesh whose elements
@@ -95,14 +96,32 @@ def levels() -> Iterator[tuple[str, Level]]:
         yield "turned", Level(name=f"elements {n}, turned", solver=TurnedElements(elements=n), error=COARSE)
 
 
-def audited() -> Iterator[tuple[str, Level, Return]]:
-    """Yield what each level gives; print what it refuses."""
+def audited(known: dict[str, Return]) -> Iterator[tuple[str, Level, Return]]:
+    """Yield what each level gives, or gave; print what it refuses."""
     meeting = Meeting.of(compose(load_scene(SCENE)), "roller", "free")
     for family, level in levels():
         try:
-            yield family, level, returned(meeting, level)
+            yield family, level, known.get(level.name) or returned(meeting, level)
         except RefusedError as error:
             print(f"| {level.name} | refused: {error} |")
+
+
+def written(folder: Path) -> dict[str, Return]:
+    """Read what a folder has."""
+    file = folder / "reversibility.json"
+    found = json.loads(file.read_text()) if file.exists() else []
+    return {one["name"]: Return(**one) for one in found}
+
+
+def write(rows: list[tuple[str, Return]], folder: Path) -> None:
+    """Write the table and the picture."""
+    found = [attrs.asdict(item) for _, item in rows]
+    (folder / "reversibility.json").write_text(json.dumps(found, indent=1) + "\n")
+    with (folder / "reversibility.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, fieldnames=list(found[0]))
+        writer.writeheader()
+        writer.writerows(found)
+    draw(rows, folder / "reversibility.png")
 
 
 def row(level: Level, found: Return) -> str:
@@ -120,7 +139,7 @@ def draw(rows: list[tuple[str, Return]], file: Path) -> None:
     figure = Figure(figsize=(11, 5), layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
-    finest = next(found for _, found in rows if found.name == "spectral 1e-6").highest
+    finest = next((found for _, found in rows if found.name == "spectral 1e-6"), rows[-1][1]).highest
     others = [pair for pair in rows if pair[1].name != "spectral 1e-6"]
     _panel(left, [(f, r, abs(r.drift)) for f, r in rows], "|height at the end − at the start| (nm)")
     _panel(right, [(f, r, abs(r.highest - finest)) for f, r in others], "|highest point − that of spectral 1e-6| (nm)")
@@ -144,21 +163,15 @@ def _panel(panel: Any, points: list[tuple[str, Return, float]], label: str) -> N
 
 def main() -> None:
     """Print the table; write it, and the picture, into a folder if one is given."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else None
     print("| level | end − start, nm | lowest, nm | highest, nm | solve, ms | solves | integrator |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     rows = []
-    for family, level, found in audited():
+    for family, level, found in audited(written(folder) if folder else {}):
         rows.append((family, found))
         print(row(level, found), flush=True)
-    if len(sys.argv) > 1:
-        folder = Path(sys.argv[1])
-        found = [attrs.asdict(item) for _, item in rows]
-        (folder / "reversibility.json").write_text(json.dumps(found, indent=1) + "\n")
-        with (folder / "reversibility.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, fieldnames=list(found[0]))
-            writer.writeheader()
-            writer.writerows(found)
-        draw(rows, folder / "reversibility.png")
+        if folder:
+            write(rows, folder)
 
 
 if __name__ == "__main__":

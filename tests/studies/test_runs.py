@@ -9,6 +9,7 @@ import pytest
 from mpad_core import load_scene, read_trajectory, run, states
 from mpad_core.interfaces.errors import InputError
 from mpad_core.records.checkpoint import read_checkpoint
+from mpad_core.records.log import read_log
 from mpad_core.running.recorder import Recorder
 from mpad_core.studies.report import summary_lines
 from recorded import datasets
@@ -128,6 +129,41 @@ def test_a_directory_is_claimed_by_its_scene(recruitment, tmp_path):
         run(recruitment(), tmp_path)
     with pytest.raises(InputError, match="very same scene"):
         run(recruitment("seed=5"), tmp_path, resume=True)
+
+
+def test_the_summary_says_what_each_effect_contributed(recruitment, tmp_path, capsys):
+    """Loads and coupling add up to one, of all and of each free cell; what is off says nothing."""
+    summary = run(recruitment('stop.time="50 ms"'), tmp_path)
+    for told in summary["runs"]:
+        parts = ("shear", "gravity", "repulsion", "bonds", "coupling")
+        for one in (told["effects"], *(cell["effects"] for cell in told["cells"].values())):
+            for share in ("velocity_share", "normal_share"):
+                found = [one[name][share] for name in parts if name in one and one[name][share] is not None]
+                assert sum(found) == pytest.approx(1, abs=0.05)  # medians of what adds up, not a sum of one step
+        assert told["effects"]["thermal"] == {
+            "on": False, "why": 'switched "off" by the scene',
+            "velocity_share": None, "normal_share": None, "time_share": None,
+        }  # fmt: skip
+        times = told["time_shares"]
+        assert sum(times[name] for name in ("coupling", "drift", "burst", "recording")) == pytest.approx(1)
+        assert times["looked_at"] >= 1
+    assert summary["effects"] == summary["runs"][0]["effects"]
+    free = summary["runs"][0]["cells"]["free"]["effects"]
+    assert free["bonds"]["velocity_share"] == 0  # it is a probe
+    assert free["shear"]["velocity_share"] > 0.5
+    lines = list(summary_lines(summary, tmp_path))
+    at = next(k for k, line in enumerate(lines) if line.startswith("effects"))
+    assert [line.split()[0] for line in lines[at + 2 : at + 10]] == list(summary["effects"])
+
+
+def test_a_run_warns_once(recruitment, tmp_path, capfd):
+    """The run and its control are of one scene: one warning of each effect, in the log and on standard error."""
+    run(recruitment(), tmp_path)
+    said = [line for line in capfd.readouterr().err.splitlines() if '"warning"' in line]
+    logged = [line for line in read_log(tmp_path / "run.jsonl") if line["event"] == "warning"]
+    assert [json.loads(line) for line in said] == logged
+    assert [line["data"]["effect"] for line in logged] == ["thermal"]  # in 3 ms the cells come nowhere near each other
+    assert 'effects.thermal = "on"' in logged[0]["data"]["text"]
 
 
 @pytest.mark.parametrize("settings", [
