@@ -33,9 +33,10 @@ from mpad_core.scene.compose import compose
 from mpad_core.studies.reversibility import Level, Meeting, Return, returned
 
 SCENE = Path(__file__).parents[1] / "examples" / "recruitment.toml"
-FLOOR = 1e-3  # nm: what the integrator may leave; less is drawn there
+FLOOR = 1e-2  # nm: what the integrator leaves; less is drawn there
 ELEMENTS = (24, 54, 96, 150)
-COARSE = 1e-7  # error of the integrator where a solve takes a tenth of a second
+COARSE, COARSER = 1e-7, 1e-6  # errors of the integrator where a solve takes a tenth of a second; where drift is large
+BELOW = ("sd", "rpb", "elements 96, turned", "elements 54")  # labels that would lie on others
 ANGLES = (0.3, 0.5, 0.7)  # rad about x, y and z, by which the turned meshes are turned
 COLOURS = {"isolated": "#8d99ae", "rpb": "#c1121f", "sd": "#e09f3e", "cdl-biem": "#1b4965", "elements": "#3d8b8b",
            "turned": "#7b2d8b"}  # fmt: skip
@@ -93,7 +94,7 @@ def levels() -> Iterator[tuple[str, Level]]:
         plain = solver("cdl-biem", discretisation="elements", elements=n)
         yield "elements", Level(name=f"elements {n}", solver=plain, error=COARSE)
     for n in ELEMENTS:
-        yield "turned", Level(name=f"elements {n}, turned", solver=TurnedElements(elements=n), error=COARSE)
+        yield "turned", Level(name=f"elements {n}, turned", solver=TurnedElements(elements=n), error=COARSER)
 
 
 def audited(known: dict[str, Return]) -> Iterator[tuple[str, Level, Return]]:
@@ -139,25 +140,32 @@ def draw(rows: list[tuple[str, Return]], file: Path) -> None:
     figure = Figure(figsize=(11, 5), layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
-    finest = next((found for _, found in rows if found.name == "spectral 1e-6"), rows[-1][1]).highest
-    others = [pair for pair in rows if pair[1].name != "spectral 1e-6"]
+    finest = next((found for _, found in rows if found.name == "spectral 1e-6"), rows[-1][1])
+    others = [(f, r, abs(r.highest - finest.highest)) for f, r in rows if r is not finest and f != "turned"]
     _panel(left, [(f, r, abs(r.drift)) for f, r in rows], "|height at the end − at the start| (nm)")
-    _panel(right, [(f, r, abs(r.highest - finest)) for f, r in others], "|highest point − that of spectral 1e-6| (nm)")
-    left.axhspan(FLOOR / 2, 2 * FLOOR, color="0.93", zorder=0)
-    left.set_title("a symmetric discretisation comes back, however coarse", fontsize=10)
-    right.set_title("how wrong the path is in between", fontsize=10)
+    _panel(right, others, "|highest point − that of spectral 1e-6| (nm)")
+    left.axhspan(FLOOR / 2, FLOOR, color="0.93", zorder=0)
+    left.set_title("what a solver drifts by: nothing, if it is symmetric", fontsize=10)
+    right.set_title("how wrong its path is in between", fontsize=10)
     figure.savefig(file, dpi=150)
 
 
 def _panel(panel: Any, points: list[tuple[str, Return, float]], label: str) -> None:
+    """Draw the points; those on the floor are labelled upright, side by side."""
     panel.set(xscale="log", yscale="log", xlabel="time of a solve (ms)", ylabel=label)
-    for k, (family, found, size) in enumerate(sorted(points, key=lambda point: point[1].solve)):
-        height = max(size, FLOOR)
-        panel.plot(found.solve, height, "o", color=COLOURS[family], ms=6)
-        up = (8, 20, 32, 44)[k % 4] if height <= FLOOR else 3
-        panel.annotate(found.name, (found.solve, height), xytext=(5, up), textcoords="offset points", fontsize=7.5,
-                       color=COLOURS[family])  # fmt: skip
-    panel.margins(x=0.15, y=0.1)
+    beside = 0.0
+    for family, found, size in sorted(points, key=lambda point: point[1].solve):
+        colour = COLOURS[family]
+        panel.plot(found.solve, max(size, FLOOR), "o", color=colour, ms=6)
+        if size > FLOOR:
+            offset = (6, -9) if found.name in BELOW else (6, 3)
+            panel.annotate(found.name, (found.solve, size), xytext=offset, textcoords="offset points", fontsize=7.5,
+                           color=colour)  # fmt: skip
+            continue
+        beside = max(found.solve, 1.35 * beside)
+        panel.plot([found.solve, beside], [FLOOR, 1.7 * FLOOR], color=colour, lw=0.6)
+        panel.text(beside, 1.9 * FLOOR, found.name, rotation=90, ha="center", va="bottom", fontsize=7.5, color=colour)
+    panel.margins(x=0.4, y=0.1)
     panel.grid(color="0.92")
 
 
