@@ -1,6 +1,8 @@
 """What the effects contributed to a run: for the summary, and in words."""
 
+import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from mpad_core.physics.problem import Problem
@@ -39,15 +41,30 @@ def effect_lines(summary: dict[str, Any]) -> Iterator[str]:
         return
     cells = list(run["cells"]) if len(run["cells"]) <= _COLUMNS else []
     yield "effects, median shares of the velocity | of the velocity normal to the wall:"
-    yield f"  {'':<12}{'time':>8}{'all':>17}" + "".join(f"{name[:16]:>17}" for name in cells)
+    yield f"  {'':<12}{'time':>9}{'all':>20}" + "".join(f"{name[:18]:>20}" for name in cells)
     for name, effect in run["effects"].items():
         own = [run["cells"][cell]["effects"].get(name, {}) for cell in cells]
         columns = "".join(f"{_percent(of, 'velocity_share')} |{_percent(of, 'normal_share')}" for of in (effect, *own))
-        yield f"  {name:<12}{_percent(effect, 'time_share')}{columns}" if effect["on"] else f"  {name:<12}{'off':>8}"
+        yield f"  {name:<12}{_percent(effect, 'time_share')}{columns}" if effect["on"] else f"  {name:<12}{'off':>9}"
     times = run["time_shares"]
     yield "time: " + ", ".join(f"{name} {100 * times[name]:.2g} %" for name in _SPENT)
 
 
 def _percent(of: dict[str, Any], key: str) -> str:
     share = of.get(key)
-    return f"{'-':>8}" if share is None else f"{100 * share:6.3f} %"
+    return f"{'-':>9}" if share is None else f"{100 * share:7.2f} %"
+
+
+def remembered(summary: dict[str, Any], file: Path) -> dict[str, Any]:
+    """Take over, for runs that had ended before this process, what an earlier summary says of their effects."""
+    try:
+        earlier = {run["folder"]: run for run in json.loads(file.read_text())["runs"]}
+        for run in summary["runs"]:
+            before = earlier.get(run["folder"])
+            if before and not run["time_shares"]["outer_steps"]:
+                run |= {key: before[key] for key in ("effects", "time_shares")}
+                for name, cell in run["cells"].items():
+                    cell["effects"] = before["cells"][name]["effects"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return summary  # there is none, or it is of an older version
+    return summary | {"effects": summary["runs"][0]["effects"]}

@@ -114,7 +114,7 @@ def run(
             for doubt in warnings_of(scene, todo[0].problem):
                 warn(log, doubt.effect, doubt.text)
             results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
-            summary = _summary(scene, results, time.monotonic() - began)
+            summary = contributions.remembered(_summary(scene, results, time.monotonic() - began), root / SUMMARY)
             _write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
             if scene.passage:
                 _draw(scene, results, root / PICTURE)
