@@ -14,7 +14,7 @@ from mpad_core.running.march import Machine, step
 
 SUB_STEPS = 20  # in a burst that is timed
 TIMES = 2  # of which the shorter one counts
-_SHORTER = 0.25  # than bursts usually are, in time
+_SHORTER = 0.5  # than bursts usually are, in time
 
 
 @define(eq=False)

@@ -1,7 +1,7 @@
 """Keeps account of what each effect contributes to a run: its share of the velocity, and of the time.
 
 It listens. What it works out from the states and couplings that it hears never goes back into the march, so a run has
-the same bits with it and without. Steps are looked at by their number: every 64th, half as often whenever there are
+the same bits with it and without. Steps are looked at by their number: every 128th, half as often whenever there are
 more than sixty, so that those looked at are spread evenly over the run.
 """
 
@@ -23,7 +23,7 @@ from mpad_core.running.balance import OuterStep
 from mpad_core.running.march import Machine
 from mpad_core.running.shares import Shares, shares
 
-EVERY, MOST = 64, 60  # outer steps between two that are looked at, to begin with; of these
+EVERY, MOST = 128, 60  # outer steps between two that are looked at, to begin with; of these
 RARER = 4  # of those looked at, how many go by until one is solved again without lubrication
 TIMED_SHARE = 0.005  # of the run's time that timing bursts may take
 
