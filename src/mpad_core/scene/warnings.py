@@ -200,7 +200,7 @@ def warnings_of(scene: Scene, problem: Problem) -> Iterator[Doubt]:
     of, on = Estimates(scene=scene, problem=problem), {effect.name: effect.on for effect in problem.effects}
     for name, when, rule in _RULES:
         if when is None or on[name] == when:
-            with blamed("a bond model or force law"):
+            with blamed("a bond model or force law"), np.errstate(all="ignore"):  # of absurd numbers nothing is said
                 text = rule(of)
             if text:
                 yield Doubt(effect=name, text=text)
