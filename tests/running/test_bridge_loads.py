@@ -31,8 +31,7 @@ class Bench:
         self.turn = turn
         self.work = Work(
             problem.radii[self.cells], np.zeros((m, m)), np.zeros((m, m)), *vectors, np.zeros(m), np.zeros(8),
-            np.zeros(1), np.zeros(m), np.zeros(m), np.zeros((2, 3, 6)), np.zeros((3, 3)), state.wall_gaps.copy(),
-            state.centres.copy(), *poses, state.centres.copy(), turn.copy(),
+            np.zeros(m), np.zeros(m), state.wall_gaps.copy(), state.centres.copy(), *poses,
         )  # fmt: skip
 
     def loads(self, moved: Any) -> tuple[Any, Any]:

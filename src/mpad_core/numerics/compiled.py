@@ -13,13 +13,16 @@ import tempfile
 from collections.abc import Callable, Iterator
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
+from inspect import signature
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import numba
+from numba.extending import overload
 
 P = ParamSpec("P")
 R = TypeVar("R")
+T = TypeVar("T")
 
 
 _CANNOT_TAKE_PART = {"scene", "records", "studies", "testing", "plugins"}  # no kernel imports from these rooms
@@ -122,6 +125,54 @@ def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
     """Compile as `compiled_lean` does, and put the code wherever it is called: for what inner loops call."""
     kernel: Callable[P, R] = _forgiving(numba.njit(**_LEAN, forceinline=True)(function))
     return kernel
+
+
+class Absent(NamedTuple):
+    """What stands where data of an effect would, if the scene leaves the effect out."""
+
+
+def absent(kind: type[T]) -> T:
+    """Give what stands for data of a kind that are not there; what acts on them is `compiled_where_present`."""
+    return cast(T, Absent())
+
+
+def _is_absent(effect: Any) -> bool:
+    return getattr(effect, "instance_class", None) is Absent
+
+
+def compiled_where_present(otherwise: Any = None) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Compile as `compiled_lean` does what acts on an effect, its first argument; with an absent one, do nothing.
+
+    Which of both is settled by type, when what calls the function is compiled: nothing is asked when it runs, what
+    belongs to an absent effect is not compiled, and no data of it are handed on. The function can only be called from
+    compiled code.
+
+    Parameters
+    ----------
+    otherwise
+        What to give where the effect is absent.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        names = ", ".join(signature(function).parameters)
+        kernel = compiled_lean(function)
+        # overloads have the names of what they stand for, and are put into the code that calls them
+        present = eval(f"lambda {names}: kernel({names})", {"kernel": kernel})
+        nothing = eval(f"lambda {names}: otherwise", {"otherwise": otherwise})
+
+        @overload(function, inline="always", strict=False)
+        def choose(effect: Any, *others: Any) -> Any:
+            return nothing if _is_absent(effect) else present
+
+        return function
+
+    return decorate
+
+
+@compiled_where_present(otherwise=False)
+def is_present(effect: Any) -> bool:
+    """Tell whether an effect is there; known when code is compiled."""
+    return True
 
 
 def compiled_within(function: Callable[P, R]) -> Callable[P, R]:

@@ -8,6 +8,7 @@ from attrs import frozen
 from mpad_core.arrays import Array, Flags, Indices
 from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.interfaces.values import BOND_EVENT
+from mpad_core.numerics.compiled import absent
 from mpad_core.numerics.streams import key_of
 from mpad_core.numerics.tables import Tables, no_tables, tabulate, together
 from mpad_core.physics.asking import blamed
@@ -17,6 +18,9 @@ from mpad_core.physics.problem import BondSpecies, Problem
 from mpad_core.physics.state import BondList, State
 from mpad_core.physics.wall_density import Densities
 from mpad_core.running.layout import (
+    Adhesion,
+    Bench,
+    Binding,
     Bodies,
     Bonds,
     Candidates,
@@ -47,7 +51,7 @@ class Fixed:
     bodies: Bodies
     molecules: Molecules
     species: Species
-    thermal: Thermal
+    thermal: Thermal  # may be absent
     contact_law: Tables
     contact_reach: float  # µm; minus infinity without a law
     key: np.uint64
@@ -116,6 +120,8 @@ def assemble(problem: Problem) -> Fixed:
     """Make the data of a problem that no burst changes."""
     sites = place_sites(problem)
     law, reach = _contact(problem)
+    owner = np.array([identity_of(n) for n in problem.names]).view(np.int64)
+    kT = problem.thermal_energy
     return Fixed(
         bodies=Bodies(
             radius=problem.radii,
@@ -126,11 +132,9 @@ def assemble(problem: Problem) -> Fixed:
             viscosity=problem.setting.viscosity,
             shear_rate=problem.setting.shear_rate,
         ),
-        molecules=Molecules(
-            sites.arm, sites.first, sites.kind, np.array([identity_of(n) for n in problem.names]).view(np.int64)
-        ),
+        molecules=Molecules(sites.arm, sites.first, sites.kind, owner),
         species=_species(problem),
-        thermal=Thermal(np.full(1 if problem.thermal_energy > 0 else 0, problem.thermal_energy)),
+        thermal=Thermal(kT, owner) if kT > 0 else absent(Thermal),
         contact_law=law,
         contact_reach=reach,
         key=key_of(problem.seed),
@@ -157,7 +161,8 @@ def near_pairs(problem: Problem, centres: Array, within: float) -> Indices:
 def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, reach: float, around: Densities) -> System:
     """Put the frozen coupling, the pairs in contact and the wall's density beside what is fixed.
 
-    `reach` is what `near_pairs` is asked with, `around` the density around the cells.
+    `reach` is what `near_pairs` is asked with, `around` the density around the cells. What the problem leaves out is
+    absent.
     """
     cells = len(problem.radii)
     place = np.full(cells, -1, np.int64)
@@ -182,11 +187,29 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
     )
     first = np.searchsorted(np.sort(owner), np.arange(len(sizes) + 1))
     contacts = Contacts(fixed.contact_law, fixed.contact_reach, np.ascontiguousarray(pairs), first)
-    bridging = (fixed.species.partner_kind >= 0).any() & (np.diff(fixed.molecules.first) > 0)[pairs].all(axis=1)
-    neighbours = neighbours_of(problem, pairs[bridging])
     return System(
-        fixed.bodies, fixed.molecules, fixed.species, contacts, neighbours, groups, fixed.thermal, around
-    )  # fmt: skip
+        bodies=fixed.bodies,
+        groups=groups,
+        contacts=contacts if problem.contact is not None else absent(Contacts),
+        thermal=fixed.thermal,
+        binding=_binding(problem, fixed, pairs, around) if problem.species else absent(Binding),
+    )
+
+
+def _binding(problem: Problem, fixed: Fixed, pairs: Indices, around: Densities) -> Binding:
+    """Put what may bind to what together; `pairs` (P, 2) are those of cells that may meet during the burst."""
+    cells, molecules, species = len(problem.radii), fixed.molecules, fixed.species
+    bridging = (species.partner_kind >= 0).any() & (np.diff(molecules.first) > 0)[pairs].all(axis=1)
+    neighbours = neighbours_of(problem, pairs[bridging])
+    factor, levers, ends = np.empty(len(problem.species)), np.empty((2, 3, 6)), np.empty((3, 3))
+    bench = Bench(factor, levers, ends, np.empty((cells, 3)), np.empty((cells, 3, 3)))
+    shell = problem.radii + problem.roughness
+    return Binding(shell, problem.wall_roughness, molecules, species, neighbours, around, bench)
+
+
+def neighbours_in(system: System) -> Neighbours | None:
+    """Give the pairs of cells that may bind to each other; None without any bonds."""
+    return system.binding.neighbours if isinstance(system.binding, Binding) else None
 
 
 def neighbours_of(problem: Problem, pairs: Indices) -> Neighbours:
@@ -200,6 +223,7 @@ def neighbours_of(problem: Problem, pairs: Indices) -> Neighbours:
 
 _BOND_FIELDS = ("site", "species", "state", "partner", "ligand", "anchor")
 _FEW = 512  # candidates of a cell, to begin with
+_EVENTS = 16_384  # of a burst before they are taken out of its table
 
 
 class Room(NamedTuple):
@@ -212,7 +236,10 @@ class Room(NamedTuple):
 
 
 def room_for(fixed: Fixed, bonds: BondList, cells: int, neighbours: Neighbours | None = None, times: int = 1) -> Room:
-    """Lay the living bonds out, with room for more; `times` is by how much there is more of it than at first."""
+    """Lay the living bonds out, with room for more; `times` is by how much there is more of it than at first.
+
+    The table of events never grows: a burst goes on with an empty one.
+    """
     counts = np.bincount(bonds.cell, minlength=cells)
     first = np.concatenate([[0], np.cumsum(2 * counts + 64 * times)])
     laid = _no_bonds(first, counts)
@@ -224,8 +251,15 @@ def room_for(fixed: Fixed, bonds: BondList, cells: int, neighbours: Neighbours |
     bound = np.zeros(len(fixed.molecules.kind), np.uint8)
     bound[bonds.site] = 1
     bound[bonds.ligand[bonds.partner >= 0]] = 1
-    events: Any = np.zeros(256 * times, BOND_EVENT)
+    events: Any = np.zeros(_EVENTS, BOND_EVENT)
     return Room(laid, bound, _candidates(fixed, neighbours, times), events)
+
+
+def adhesion_of(problem: Problem, room: Room, clocks: Clocks, ahead: Array) -> Adhesion:
+    """Put what a burst may change about bonds together; absent where there are none. `ahead` as in `Adhesion`."""
+    if not problem.species:
+        return absent(Adhesion)
+    return Adhesion(room.bonds, room.bound, room.candidates, clocks, ahead, room.events)
 
 
 def _no_bonds(first: Indices, counts: Indices) -> Bonds:

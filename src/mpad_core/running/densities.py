@@ -2,8 +2,9 @@
 
 import math
 
-from mpad_core.numerics.compiled import compiled_inline, compiled_lean
+from mpad_core.numerics.compiled import compiled_inline, compiled_where_present
 from mpad_core.physics.wall_density import Densities
+from mpad_core.running.layout import Binding
 
 
 @compiled_inline
@@ -22,9 +23,10 @@ def density_at(densities: Densities, cell: int, kind: int, x: float, y: float) -
     return float(densities.value[start + i * size + j])
 
 
-@compiled_lean
-def holds(densities: Densities, cell: int, x: float, y: float) -> bool:
+@compiled_where_present(otherwise=True)
+def holds(binding: Binding, cell: int, x: float, y: float) -> bool:
     """Tell whether the windows of a cell centred at (x, y), in µm, hold all that its molecules may reach."""
+    densities = binding.densities
     for kind in range(densities.spacing.shape[0]):
         size, spacing, reach = densities.size[cell, kind], densities.spacing[kind], densities.reach[cell, kind]
         if size == 1:

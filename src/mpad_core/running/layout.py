@@ -1,6 +1,7 @@
 """The data of the burst: named tuples of arrays, which compiled code takes as they are.
 
-An effect that the scene leaves out is a table or list of length zero here; the code never asks.
+Where the scene has no bonds, no repulsion or no thermal motion, an `Absent` stands for their data: the burst is then
+compiled without them. What else may be missing is a table or list of length zero; the code never asks.
 """
 
 from typing import NamedTuple
@@ -66,8 +67,8 @@ class Bonds(NamedTuple):
 class Contacts(NamedTuple):
     """Repulsion between roughness layers."""
 
-    law: Tables  # one table or none; column: force (pN) over tip gap (µm)
-    reach: float  # µm, tip gap beyond which there is no force; minus infinity without a law
+    law: Tables  # one table; column: force (pN) over tip gap (µm)
+    reach: float  # µm, tip gap beyond which there is no force
     pairs: Indices  # (P, 2) cells that may come into contact during the burst, in the order of the first one's group
     pair_first: Indices  # (groups + 1,) each group's first pair
 
@@ -93,20 +94,40 @@ class Groups(NamedTuple):
 class Thermal(NamedTuple):
     """Thermal motion."""
 
-    energy: Array  # (1,) kT, pN µm; (0,) where there is no thermal motion
+    energy: float  # kT, pN µm
+    owner: Indices  # (N,) each cell's identity in draws, as in Molecules
+
+
+class Bench(NamedTuple):
+    """What rates and loads of bonds are worked out in, one cell or pair of cells after the other."""
+
+    factor: Array  # (K,) on on-rates
+    levers: Array  # (2, 3, 6) and (3, 3): of a bond between cells
+    ends: Array
+    middle: Array  # (N, 3) and (N, 3, 3): places and turns of cells on their way
+    middle_turn: Array
+
+
+class Binding(NamedTuple):
+    """What may bind to what."""
+
+    shell: Array  # (N,) µm, radius on which a cell's molecules lie
+    wall_tips: float  # µm, height of the wall's molecules
+    molecules: Molecules
+    species: Species
+    neighbours: Neighbours
+    densities: Densities  # of the wall's sites around each cell, by the one that the on-rate is given at
+    bench: Bench
 
 
 class System(NamedTuple):
-    """All that a burst reads and does not change."""
+    """All that a burst reads and does not change; the last three may be absent."""
 
     bodies: Bodies
-    molecules: Molecules
-    species: Species
-    contacts: Contacts
-    neighbours: Neighbours
     groups: Groups
+    contacts: Contacts
     thermal: Thermal
-    densities: Densities  # of the wall's sites around each cell, by the one that the on-rate is given at
+    binding: Binding
 
 
 class Motion(NamedTuple):
@@ -134,18 +155,13 @@ class Work(NamedTuple):
     moved: Array  # (m,)
     noise: Array  # (m,) s^½, increments of the Brownian paths
     functions: Array  # (8,) of the wall
-    factor: Array  # (K,) on on-rates
     push: Array  # (m,) and (m,): of thermal motion
     star: Array
-    levers: Array  # (2, 3, 6) and (3, 3): of a bond between cells
-    ends: Array
     gaps: Array  # (N,) µm; the rest as in Motion, for all cells
     centre: Array  # (N, 3)
     orientation: Array  # (N, 4)
     rotation: Array  # (N, 3) as motion.turn
     turn: Array  # (N, 3, 3) rotation matrices
-    middle: Array  # (N, 3) and (N, 3, 3): between start and end
-    middle_turn: Array
 
 
 class Clocks(NamedTuple):
@@ -183,7 +199,7 @@ class Limits(NamedTuple):
     most: int  # sub-steps
     error: float  # µm, of a cell's surface over the part of a sub-step that it moves at once
     rate: float  # relative, of the rates of events
-    euler: Array  # (1,) s, step of the explicit scheme; (0,) for the implicit one
+    euler: float  # s, step of the explicit scheme; absent for the implicit one
     start: Array  # (N, 3) µm, centres when the coupling was frozen
     pairs: Indices  # (P, 2)
     pair_move: Array  # (P,) µm, relative displacement allowed
@@ -224,19 +240,25 @@ class Candidates(NamedTuple):
     pair_from: Array  # (P, 3, 9) relative place and both turns at that time
 
 
+class Adhesion(NamedTuple):
+    """The bonds, and what may happen to them."""
+
+    bonds: Bonds
+    bound: Flags  # (S,) whether each molecule is bound
+    listed: Candidates
+    clocks: Clocks
+    ahead: Array  # (N, 2) 1/s, each cell's rates on the way that is being tried
+    events: Array  # of BOND_EVENT
+
+
 class Course(NamedTuple):
-    """All that a burst has to do with."""
+    """All that a burst has to do with; the last may be absent, with the system's `Binding`."""
 
     system: System
     limits: Limits
     dice: Dice
     motion: Motion
     turn: Array  # (N, 3, 3) the cells' rotation matrices
-    bonds: Bonds
-    bound: Flags  # (S,) whether each molecule is bound
-    listed: Candidates
-    clocks: Clocks
-    ahead: Array  # (N, 2) 1/s, each cell's rates on the way that is being tried
     progress: Progress
     trail: Trail
-    events: Array  # of BOND_EVENT
+    adhesion: Adhesion

@@ -138,16 +138,14 @@ def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits, s
     dice = Dice(fixed.key, state.step, stride)
     outcome, times, bonds, events, ahead = ROOM_NEEDED, 1, state.bonds, [], np.zeros((cells, 2))
     while outcome == ROOM_NEEDED:
-        room = assembly.room_for(fixed, bonds, cells, data.neighbours, times)
-        course = Course(
-            data, bounds, dice, motion, np.empty((cells, 3, 3)), room.bonds, room.bound, room.candidates, clocks,
-            ahead, progress, trail, room.events,
-        )  # fmt: skip
-        outcome, group = burst(course)
+        room = assembly.room_for(fixed, bonds, cells, assembly.neighbours_in(data), times)
+        adhesion = assembly.adhesion_of(problem, room, clocks, ahead)
+        outcome, group = burst(Course(data, bounds, dice, motion, np.empty((cells, 3, 3)), progress, trail, adhesion))
         bonds = assembly.bond_list(room.bonds)
         events.append(room.events[: progress.events[0]])
+        if progress.events[0] < len(room.events):  # not of these was there too little room
+            times *= _MORE_ROOM
         progress.events[0] = 0
-        times *= _MORE_ROOM
     if outcome == NO_BALANCE or (outcome == NOT_POSITIVE and progress.beats[0] == 0):
         _refuse(machine, state, coupling, outcome, group)
     made = _Done(motion, clocks, bonds, np.concatenate(events), progress, trail)

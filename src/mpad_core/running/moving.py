@@ -14,11 +14,11 @@ import math
 
 import numpy as np
 
-from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled_inline, compiled_lean
+from mpad_core.arrays import Array, Indices
+from mpad_core.numerics.compiled import compiled_inline, compiled_lean, compiled_where_present, is_present
 from mpad_core.numerics.rotations import matrix_of, turned, turned_vector
 from mpad_core.numerics.tables import value_and_slope
-from mpad_core.running.layout import Bonds, Motion, System, Work
+from mpad_core.running.layout import Bench, Binding, Bodies, Bonds, Contacts, Groups, Motion, System, Work
 from mpad_core.running.places import place_of
 from mpad_core.running.reacting import TENSION
 from mpad_core.running.resisting import resistance, solve_in_place
@@ -94,16 +94,39 @@ def _add_crossed(
             stiffness[p + j, o + i] += total
 
 
+@compiled_where_present()
+def _add_wall_contact(
+    contacts: Contacts, cell: int, o: int, gap: float, bodies: Bodies, load: Array, stiffness: Array
+) -> None:
+    """Add the repulsion between the bumps of a cell and those of the wall, at a gap (µm) between smooth surfaces."""
+    tip_gap = gap - bodies.roughness[cell] - bodies.wall_tips
+    if tip_gap < contacts.reach:
+        force, slope = value_and_slope(contacts.law, 0, 0, tip_gap)
+        load[o + 2] += force
+        stiffness[o + 2, o + 2] -= slope
+
+
+@compiled_where_present()
+def _add_pair_contacts(
+    contacts: Contacts, group: int, bodies: Bodies, groups: Groups, centre: Array, moved: Array, load: Array,
+    stiffness: Array,
+) -> None:  # fmt: skip
+    """Add the repulsion between the cells of a group, and between them and held ones."""
+    for p in range(contacts.pair_first[group], contacts.pair_first[group + 1]):
+        i, j = contacts.pairs[p, 0], contacts.pairs[p, 1]
+        _add_pair_contact(i, j, contacts, bodies, groups.place, centre, moved, load, stiffness)
+
+
 @compiled_lean
 def _add_pair_contact(
-    i: int, j: int, moved: Array, system: System, motion: Motion, load: Array, stiffness: Array
-) -> None:
+    i: int, j: int, contacts: Contacts, bodies: Bodies, places: Indices, centre: Array, moved: Array, load: Array,
+    stiffness: Array,
+) -> None:  # fmt: skip
     """Add the repulsion between the bumps of two cells; a place of -1 is a held cell, which takes no load."""
-    bodies, contacts = system.bodies, system.contacts
-    at_i, at_j = system.groups.place[i], system.groups.place[j]
-    dx = motion.centre[i, 0] - motion.centre[j, 0]
-    dy = motion.centre[i, 1] - motion.centre[j, 1]
-    dz = motion.centre[i, 2] - motion.centre[j, 2]
+    at_i, at_j = places[i], places[j]
+    dx = centre[i, 0] - centre[j, 0]
+    dy = centre[i, 1] - centre[j, 1]
+    dz = centre[i, 2] - centre[j, 2]
     for place, sign in ((at_i, 1.0), (at_j, -1.0)):
         if place >= 0:
             dx += sign * moved[6 * place]
@@ -129,11 +152,11 @@ def _add_pair_contact(
 
 
 @compiled_lean
-def _pose(cell: int, place: int, moved: Array, motion: Motion, turn: Array, work: Work) -> None:
-    """Write a cell's place and rotation matrix, once it has moved, into `work`; a place of -1 is a held cell."""
-    centre, turned = work.middle[cell], work.middle_turn[cell]
+def _pose(cell: int, place: int, moved: Array, centre: Array, turn: Array, bench: Bench) -> None:
+    """Write a cell's place and rotation matrix, once it has moved, onto the bench; a place of -1 is a held cell."""
+    middle, turned = bench.middle[cell], bench.middle_turn[cell]
     for i in range(3):
-        centre[i] = motion.centre[cell, i] + (moved[6 * place + i] if place >= 0 else 0.0)
+        middle[i] = centre[cell, i] + (moved[6 * place + i] if place >= 0 else 0.0)
         for j in range(3):
             turned[i, j] = turn[cell, i, j]
     if place >= 0:
@@ -145,14 +168,14 @@ def _pose(cell: int, place: int, moved: Array, motion: Motion, turn: Array, work
 
 
 @compiled_lean
-def _add_wall_bonds(cell: int, o: int, system: System, bonds: Bonds, work: Work) -> None:
+def _add_wall_bonds(cell: int, o: int, binding: Binding, bonds: Bonds, load: Array, stiffness: Array) -> None:
     """Add the loads of a cell's bonds to the wall."""
     # taken out of their tuples here, since doing so costs a hundred sums
     arms, first, slack_below, tables = (
-        system.molecules.arm, system.species.first, system.species.slack_below, system.species.tables,
+        binding.molecules.arm, binding.species.first, binding.species.slack_below, binding.species.tables,
     )  # fmt: skip
     site, species, state, partner, anchor = bonds.site, bonds.species, bonds.state, bonds.partner, bonds.anchor
-    load, stiffness, centre, turn = work.load, work.stiffness, work.middle[cell], work.middle_turn[cell]
+    centre, turn = binding.bench.middle[cell], binding.bench.middle_turn[cell]
     for bond in range(bonds.first[cell], bonds.first[cell] + bonds.number[cell]):
         ax, ay, az = arms[site[bond], 0], arms[site[bond], 1], arms[site[bond], 2]
         bx = turn[0, 0] * ax + turn[0, 1] * ay + turn[0, 2] * az
@@ -172,40 +195,56 @@ def _add_wall_bonds(cell: int, o: int, system: System, bonds: Bonds, work: Work)
 
 @compiled_lean
 def _add_bridge(
-    bond: int, cell: int, o: int, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work
-) -> None:
+    bond: int, cell: int, o: int, binding: Binding, bonds: Bonds, places: Indices, centre: Array, turn: Array,
+    moved: Array, load: Array, stiffness: Array,
+) -> None:  # fmt: skip
     """Add the loads of a bond between two cells on both; a partner that is held takes none."""
-    molecules, species = system.molecules, system.species
+    molecules, species, bench = binding.molecules, binding.species, binding.bench
+    middle, middle_turn, levers = bench.middle, bench.middle_turn, bench.levers
     partner = bonds.partner[bond]
-    place = system.groups.place[partner]
-    _pose(partner, place, work.moved, motion, turn, work)
+    place = places[partner]
+    _pose(partner, place, moved, centre, turn, bench)
     mine, theirs = (
-        place_of(bonds.site[bond], work.middle[cell], work.middle_turn[cell], molecules),
-        place_of(bonds.ligand[bond], work.middle[partner], work.middle_turn[partner], molecules),
+        place_of(bonds.site[bond], middle[cell], middle_turn[cell], molecules),
+        place_of(bonds.ligand[bond], middle[partner], middle_turn[partner], molecules),
     )
-    d, b, e = work.ends[0], work.ends[1], work.ends[2]
+    d, b, e = bench.ends[0], bench.ends[1], bench.ends[2]
     for i in range(3):
         d[i] = mine[i] - theirs[i]
-        b[i] = mine[i] - work.middle[cell, i]
-        e[i] = theirs[i] - work.middle[partner, i]
+        b[i] = mine[i] - middle[cell, i]
+        e[i] = theirs[i] - middle[partner, i]
     length = math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
     table = species.first[bonds.species[bond]] + bonds.state[bond]
     tension, slope = value_and_slope(species.tables, table, TENSION, length)
     if length == 0.0 or (tension == 0.0 and slope == 0.0):
         return
-    _add_bond(o, b[0], b[1], b[2], d[0], d[1], d[2], length, tension, slope, work.load, work.stiffness)
+    _add_bond(o, b[0], b[1], b[2], d[0], d[1], d[2], length, tension, slope, load, stiffness)
     if place >= 0:
         p = 6 * place
-        _add_bond(p, e[0], e[1], e[2], -d[0], -d[1], -d[2], length, tension, slope, work.load, work.stiffness)
-        _lever(b[0], b[1], b[2], work.levers[0])
-        _lever(e[0], e[1], e[2], work.levers[1])
-        _add_crossed(o, p, d, length, tension, slope, work.levers[0], work.levers[1], work.stiffness)
+        _add_bond(p, e[0], e[1], e[2], -d[0], -d[1], -d[2], length, tension, slope, load, stiffness)
+        _lever(b[0], b[1], b[2], levers[0])
+        _lever(e[0], e[1], e[2], levers[1])
+        _add_crossed(o, p, d, length, tension, slope, levers[0], levers[1], stiffness)
+
+
+@compiled_where_present()
+def _add_bonds(
+    binding: Binding, bonds: Bonds, cell: int, place: int, places: Indices, centre: Array, turn: Array, moved: Array,
+    load: Array, stiffness: Array,
+) -> None:  # fmt: skip
+    """Add the loads of a cell's bonds, to the wall and to other cells."""
+    if bonds.number[cell] > 0:
+        _pose(cell, place, moved, centre, turn, binding.bench)
+        _add_wall_bonds(cell, 6 * place, binding, bonds, load, stiffness)
+        for k in range(bonds.bridges[cell]):
+            bond = bonds.bridge[bonds.first[cell] + k]
+            _add_bridge(bond, cell, 6 * place, binding, bonds, places, centre, turn, moved, load, stiffness)
 
 
 @compiled_lean
 def _add_loads(group: int, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work) -> None:
     """Write all loads but the fluid's, and their stiffness, for the group moved and turned by `work.moved` (6n,)."""
-    bodies, groups, contacts = system.bodies, system.groups, system.contacts
+    bodies, groups, contacts, places = system.bodies, system.groups, system.contacts, system.groups.place
     load, stiffness, moved = work.load, work.stiffness, work.moved
     start = groups.first[group]
     load[:] = 0.0
@@ -215,18 +254,9 @@ def _add_loads(group: int, system: System, bonds: Bonds, motion: Motion, turn: A
         o = 6 * place
         for i in range(6):
             load[o + i] += bodies.external[cell, i]
-        tip_gap = motion.gap[cell] + moved[o + 2] - bodies.roughness[cell] - bodies.wall_tips
-        if tip_gap < contacts.reach:
-            force, slope = value_and_slope(contacts.law, 0, 0, tip_gap)
-            load[o + 2] += force
-            stiffness[o + 2, o + 2] -= slope
-        if bonds.number[cell] > 0:
-            _pose(cell, place, moved, motion, turn, work)
-            _add_wall_bonds(cell, o, system, bonds, work)
-            for k in range(bonds.bridges[cell]):
-                _add_bridge(bonds.bridge[bonds.first[cell] + k], cell, o, system, bonds, motion, turn, work)
-    for p in range(contacts.pair_first[group], contacts.pair_first[group + 1]):
-        _add_pair_contact(contacts.pairs[p, 0], contacts.pairs[p, 1], moved, system, motion, load, stiffness)
+        _add_wall_contact(contacts, cell, o, motion.gap[cell] + moved[o + 2], bodies, load, stiffness)
+        _add_bonds(system.binding, bonds, cell, place, places, motion.centre, turn, moved, load, stiffness)
+    _add_pair_contacts(contacts, group, bodies, groups, motion.centre, moved, load, stiffness)
 
 
 @compiled_lean
@@ -305,14 +335,12 @@ def advance(group: int, dt: float, system: System, bonds: Bonds, motion: Motion,
     groups = system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
     velocity = work.velocity
-    share = GAP_SHARE
-    if system.thermal.energy.shape[0] == 0:
+    share = SHAKEN_SHARE if is_present(system.thermal) else GAP_SHARE
+    if not is_present(system.thermal):
         _lead(group, dt, system, motion, work.gaps)
-        resistance(group, system, work.gaps, work.functions, work.matrix, work.right)
-    for k in range(system.thermal.energy.shape[0]):
-        share = SHAKEN_SHARE
-        if not shake(group, dt, system.thermal.energy[k], system, motion.gap, work):
-            return math.inf
+        resistance(group, system.bodies, system.groups, work.gaps, work.functions, work.matrix, work.right)
+    if not shake(system.thermal, group, dt, system, motion.gap, work):
+        return math.inf
     for place in range(n):
         for i in range(6):
             velocity[6 * place + i] = motion.velocity[groups.cells[start + place], i]
@@ -326,15 +354,15 @@ def advance(group: int, dt: float, system: System, bonds: Bonds, motion: Motion,
             return math.inf
         for i in range(6):
             work.change[o + i] = velocity[o + i] - motion.velocity[cell, i]
-    _try_out(group, dt, system, motion, work)
+    _try_out(group, dt, system.groups, motion, work)
     return 0.5 * _surface_move(work.change, dt, work.radius)
 
 
 @compiled_lean
-def _try_out(group: int, dt: float, system: System, motion: Motion, work: Work) -> None:
+def _try_out(group: int, dt: float, groups: Groups, motion: Motion, work: Work) -> None:
     """Write where the group's cells are after dt."""
     for place in range(work.radius.shape[0]):
-        cell, o = system.groups.cells[system.groups.first[group] + place], 6 * place
+        cell, o = groups.cells[groups.first[group] + place], 6 * place
         velocity = work.velocity
         for i in range(3):
             work.centre[cell, i] = motion.centre[cell, i] + dt * velocity[o + i]
@@ -347,10 +375,10 @@ def _try_out(group: int, dt: float, system: System, motion: Motion, work: Work) 
 
 
 @compiled_lean
-def commit(group: int, dt: float, system: System, motion: Motion, turn: Array, work: Work) -> None:
+def commit(group: int, dt: float, groups: Groups, motion: Motion, turn: Array, work: Work) -> None:
     """Let the group be where `advance` over dt has taken it."""
     for place in range(work.radius.shape[0]):
-        cell, o = system.groups.cells[system.groups.first[group] + place], 6 * place
+        cell, o = groups.cells[groups.first[group] + place], 6 * place
         motion.gap[cell] += dt * work.velocity[o + 2]
         for i in range(6):
             motion.velocity[cell, i] = work.velocity[o + i]
@@ -369,13 +397,13 @@ def step_explicitly(
     group: int, dt: float, system: System, bonds: Bonds, motion: Motion, turn: Array, work: Work
 ) -> None:
     """Write into `work` the velocities that balance the loads of the start, and where they take a group in dt."""
-    resistance(group, system, motion.gap, work.functions, work.matrix, work.right)
+    resistance(group, system.bodies, system.groups, motion.gap, work.functions, work.matrix, work.right)
     work.moved[:] = 0.0
     _add_loads(group, system, bonds, motion, turn, work)
     for i in range(work.velocity.shape[0]):
         work.velocity[i] = work.right[i] + work.load[i]
     solve_in_place(work.matrix, work.velocity)
-    _try_out(group, dt, system, motion, work)
+    _try_out(group, dt, system.groups, motion, work)
 
 
 @compiled_lean

@@ -7,6 +7,7 @@ import numpy as np
 from attrs import frozen
 
 from mpad_core.arrays import Array, Indices
+from mpad_core.numerics.compiled import absent
 from mpad_core.physics.coupling import contact_reach
 from mpad_core.physics.problem import Problem
 from mpad_core.running.assembly import pair_gaps
@@ -159,7 +160,7 @@ def limits(
     free = problem.setting.wall & problem.coupled
     low = middle_gaps * (1 - _GAP_CHANGE) if free else np.full(len(middle_gaps), -np.inf)
     high = middle_gaps * (1 + _GAP_CHANGE) if free else np.full(len(middle_gaps), np.inf)
-    euler = np.full(1 if pace.euler > 0 else 0, pace.euler)
+    euler = pace.euler if pace.euler > 0 else absent(float)
     return Limits(
         stride.grains * pace.grain, stride.sub_steps, pace.error, pace.rate, euler, centres, moves.pairs,
         _FARTHER * moves.allowed, low, high,

@@ -7,7 +7,7 @@ from mpad_core.numerics.compiled import compiled_inline, compiled_lean
 from mpad_core.numerics.streams import Stream, Word, mixed, uniform
 from mpad_core.numerics.tables import value
 from mpad_core.running.densities import density_at
-from mpad_core.running.layout import Bonds, Candidates, Clocks, Molecules, Progress, Species, System
+from mpad_core.running.layout import Binding, Bonds, Candidates, Clocks, Molecules, Progress, Species
 from mpad_core.running.places import distance, place_of
 
 _ANCHORS = int(Stream.ANCHORS)
@@ -70,8 +70,8 @@ def _forming_rate(kind: int, length: float, species: Species) -> float:
 
 @compiled_lean
 def rates(
-    cell: int, stop: float, centre: Array, turn: Array, system: System, bonds: Bonds, bound: Flags, listed: Candidates,
-    factor: Array,
+    cell: int, stop: float, centre: Array, turn: Array, binding: Binding, bonds: Bonds, bound: Flags,
+    listed: Candidates, factor: Array,
 ) -> tuple[float, int, float]:  # fmt: skip
     """Sum the rates of all that can happen to a cell, its bonds first, until the sum exceeds `stop`.
 
@@ -95,7 +95,7 @@ def rates(
         By how much it then exceeds.
     """
     # taken out of their tuples here, since doing so costs a hundred sums
-    molecules, species, densities, tips = system.molecules, system.species, system.densities, system.bodies.wall_tips
+    molecules, species, densities, tips = binding.molecules, binding.species, binding.densities, binding.wall_tips
     total = 0.0
     first, count = bonds.first[cell], bonds.number[cell]
     for bond in range(first, first + count):
@@ -134,27 +134,27 @@ def rates(
 
 @compiled_lean
 def _record(
-    kind: int, bond: int, cell: int, length: float, step: int, time: float, system: System, bonds: Bonds,
+    kind: int, bond: int, cell: int, length: float, step: int, time: float, binding: Binding, bonds: Bonds,
     progress: Progress, events: Array,
 ) -> None:  # fmt: skip
     """Append an event at a time since the burst began."""
     event = events[progress.events[0]]
     partner = bonds.partner[bond]
     ligand = bonds.ligand[bond]
-    table = system.species.first[bonds.species[bond]] + bonds.state[bond]
+    table = binding.species.first[bonds.species[bond]] + bonds.state[bond]
     event.step = step
     event.time = time
     event.kind = kind
     event.species = bonds.species[bond]
     event.state = bonds.state[bond]
     event.cell = cell
-    event.receptor = bonds.site[bond] - system.molecules.first[cell]
+    event.receptor = bonds.site[bond] - binding.molecules.first[cell]
     event.partner = partner
-    event.ligand = ligand if partner < 0 else ligand - system.molecules.first[partner]
+    event.ligand = ligand if partner < 0 else ligand - binding.molecules.first[partner]
     event.anchor_x = bonds.anchor[bond, 0]  # of a bond between cells: where it was when the bond formed
     event.anchor_y = bonds.anchor[bond, 1]
     event.length = length
-    event.force = value(system.species.tables, table, TENSION, length)
+    event.force = value(binding.species.tables, table, TENSION, length)
     progress.events[0] += 1
 
 
@@ -191,7 +191,7 @@ def _drop(bond: int, cell: int, bonds: Bonds, bound: Flags) -> None:
 
 @compiled_lean
 def _bind(
-    candidate: int, cell: int, angle: float, centre: Array, turn: Array, system: System, bonds: Bonds, bound: Flags,
+    candidate: int, cell: int, angle: float, centre: Array, turn: Array, binding: Binding, bonds: Bonds, bound: Flags,
     listed: Candidates,
 ) -> int:  # fmt: skip
     """Make a candidate a bond of inner state 0; give it.
@@ -201,17 +201,17 @@ def _bind(
     """
     bond = bonds.first[cell] + bonds.number[cell]
     site, kind = listed.site[candidate], listed.species[candidate]
-    tips = system.bodies.wall_tips
+    tips = binding.wall_tips
     bonds.site[bond], bonds.species[bond], bonds.state[bond] = site, kind, 0
     bonds.partner[bond], bonds.ligand[bond] = listed.partner[candidate], listed.ligand[candidate]
-    x, y, z = place_of(site, centre[cell], turn[cell], system.molecules)
+    x, y, z = place_of(site, centre[cell], turn[cell], binding.molecules)
     partner, height = listed.partner[candidate], tips
     if partner >= 0:
-        x, y, height = place_of(listed.ligand[candidate], centre[partner], turn[partner], system.molecules)
-    elif system.species.pairwise[kind]:
+        x, y, height = place_of(listed.ligand[candidate], centre[partner], turn[partner], binding.molecules)
+    elif binding.species.pairwise[kind]:
         x, y = listed.x[candidate], listed.y[candidate]
     else:
-        lateral = math.sqrt(max(system.species.least_length[kind] ** 2 - (z - tips) ** 2, 0.0))
+        lateral = math.sqrt(max(binding.species.least_length[kind] ** 2 - (z - tips) ** 2, 0.0))
         x, y = x + lateral * math.cos(angle), y + lateral * math.sin(angle)
     bonds.anchor[bond, 0], bonds.anchor[bond, 1], bonds.anchor[bond, 2] = x, y, height
     bonds.number[cell] += 1
@@ -223,31 +223,31 @@ def _bind(
 
 
 @compiled_lean
-def _changed(bond: int, length: float, excess: float, system: System, bonds: Bonds) -> int:
+def _changed(bond: int, length: float, excess: float, binding: Binding, bonds: Bonds) -> int:
     """Give the inner state that a bond changes to, or -1 if it breaks.
 
     `excess` lies in what the sum of its rates is, counted back from the last.
     """
     kind, state = bonds.species[bond], bonds.state[bond]
-    table = system.species.first[kind] + state
-    for to in range(system.species.first[kind + 1] - system.species.first[kind] - 1, -1, -1):
+    table = binding.species.first[kind] + state
+    for to in range(binding.species.first[kind + 1] - binding.species.first[kind] - 1, -1, -1):
         if to != state:
-            excess -= value(system.species.tables, table, EXCHANGE + to, length)
+            excess -= value(binding.species.tables, table, EXCHANGE + to, length)
             if excess <= 0:
                 return to
     return -1
 
 
 @compiled_lean
-def _born_state(kind: int, length: float, share: float, system: System) -> int:
+def _born_state(kind: int, length: float, share: float, binding: Binding) -> int:
     """Give the inner state that a new bond has, for a share of the sum of the rates into all of them."""
-    first, last = system.species.first[kind], system.species.first[kind + 1] - 1
+    first, last = binding.species.first[kind], binding.species.first[kind + 1] - 1
     total = 0.0
     for table in range(first, last + 1):
-        total += value(system.species.tables, table, ON_RATE, length)
+        total += value(binding.species.tables, table, ON_RATE, length)
     short = share * total
     for table in range(first, last):
-        short -= value(system.species.tables, table, ON_RATE, length)
+        short -= value(binding.species.tables, table, ON_RATE, length)
         if short < 0:
             return int(table - first)
     return int(last - first)
@@ -256,7 +256,7 @@ def _born_state(kind: int, length: float, share: float, system: System) -> int:
 @compiled_lean
 def happen(
     cell: int, which: int, excess: float, step: int, time: float, centre: Array, turn: Array, key: Word,
-    system: System, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
+    binding: Binding, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
 ) -> None:  # fmt: skip
     """Let the event happen that `rates` stopped at, and record it; nothing if the wall's molecule is bound already."""
     count = bonds.number[cell]
@@ -269,31 +269,30 @@ def happen(
             and _is_taken(kind, listed.ligand[candidate], bonds)
         ):
             return
-        who = mixed(system.molecules.owner[cell], clocks.number[cell])
+        who = mixed(binding.molecules.owner[cell], clocks.number[cell])
         bond = _bind(
-            candidate, cell, 2 * math.pi * uniform(key, _ANCHORS, who, 0), centre, turn, system, bonds, bound, listed
+            candidate, cell, 2 * math.pi * uniform(key, _ANCHORS, who, 0), centre, turn, binding, bonds, bound, listed
         )
-        length = bond_length(bond, cell, centre, turn, bonds, system.molecules)
-        bonds.state[bond] = _born_state(kind, length, uniform(key, _ANCHORS, who, 1), system)
-        _record(FORMED, bond, cell, length, step, time, system, bonds, progress, events)
+        length = bond_length(bond, cell, centre, turn, bonds, binding.molecules)
+        bonds.state[bond] = _born_state(kind, length, uniform(key, _ANCHORS, who, 1), binding)
+        _record(FORMED, bond, cell, length, step, time, binding, bonds, progress, events)
         return
     bond = bonds.first[cell] + which
-    length = bond_length(bond, cell, centre, turn, bonds, system.molecules)
-    to = _changed(bond, length, excess, system, bonds)
+    length = bond_length(bond, cell, centre, turn, bonds, binding.molecules)
+    to = _changed(bond, length, excess, binding, bonds)
     if to >= 0:
         bonds.state[bond] = to
-        _record(CHANGED, bond, cell, length, step, time, system, bonds, progress, events)
+        _record(CHANGED, bond, cell, length, step, time, binding, bonds, progress, events)
     else:
-        _record(BROKEN, bond, cell, length, step, time, system, bonds, progress, events)
+        _record(BROKEN, bond, cell, length, step, time, binding, bonds, progress, events)
         _drop(bond, cell, bonds, bound)
 
 
 @compiled_lean
-def slip_factors(cell: int, velocity: Array, gap: float, system: System, out: Array) -> None:
-    """Write the factors (K,) that a cell's slip past the wall puts on its on-rates; `velocity` (6,)."""
-    species, lever = system.species, system.bodies.radius[cell] + gap
-    slip_x = velocity[0] - lever * velocity[4]
-    slip_y = velocity[1] + lever * velocity[3]
+def slip_factors(velocity: Array, height: float, species: Species, out: Array) -> None:
+    """Write the factors (K,) that the slip of a cell at a height puts on its on-rates; `velocity` (6,)."""
+    slip_x = velocity[0] - height * velocity[4]
+    slip_y = velocity[1] + height * velocity[3]
     for kind in range(out.shape[0]):
         out[kind] = 1.0
         if species.encounter[kind] >= 0 and species.partner_kind[kind] < 0:

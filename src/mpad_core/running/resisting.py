@@ -5,7 +5,7 @@ import math
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled_lean
 from mpad_core.numerics.wall_functions import add_wall_resistance
-from mpad_core.running.layout import System
+from mpad_core.running.layout import Bodies, Groups
 
 
 @compiled_lean
@@ -50,9 +50,10 @@ def solve_in_place(matrix: Array, right: Array) -> None:
 
 
 @compiled_lean
-def resistance(group: int, system: System, gaps: Array, functions: Array, matrix: Array, right: Array) -> None:
+def resistance(
+    group: int, bodies: Bodies, groups: Groups, gaps: Array, functions: Array, matrix: Array, right: Array
+) -> None:
     """Write r(h) + C (6n, 6n) and f(h) + k + g (6n,) of a group at gaps (N,); `functions` (8,) is scratch."""
-    bodies, groups = system.bodies, system.groups
     start, n = groups.first[group], groups.first[group + 1] - groups.first[group]
     m, offset, coupling = 6 * n, groups.coupling_first[group], groups.coupling
     for i in range(m):

@@ -24,9 +24,9 @@ to do, and short enough that what comes out too large is a matter of five standa
 import math
 
 from mpad_core.arrays import Array
-from mpad_core.numerics.compiled import compiled_lean
+from mpad_core.numerics.compiled import compiled_lean, compiled_where_present
 from mpad_core.numerics.streams import Stream, Word, mixed, normal_pair
-from mpad_core.running.layout import System, Work
+from mpad_core.running.layout import Groups, System, Thermal, Work
 from mpad_core.running.resisting import is_positive_definite, resistance
 
 TICKS = 1 << 30  # a sub-step is never split finer, and events fall on these: 1 ps of 1 ms
@@ -57,21 +57,23 @@ def path(key: Word, owner: Word, pair: int, step: int, tick: int) -> tuple[float
     return x_high, y_high
 
 
-@compiled_lean
-def draw(group: int, system: System, key: Word, step: int, first: int, last: int, dt: float, noise: Array) -> None:
+@compiled_where_present()
+def draw(
+    thermal: Thermal, group: int, groups: Groups, key: Word, step: int, first: int, last: int, dt: float, noise: Array
+) -> None:
     """Write the increments (s^½) of a group's paths from tick to tick of a sub-step of dt into the first 6n places."""
-    start, end = system.groups.first[group], system.groups.first[group + 1]
+    start, end = groups.first[group], groups.first[group + 1]
     for k in range(3 * (end - start)):
-        owner = system.molecules.owner[system.groups.cells[start + k // 3]]
+        owner = thermal.owner[groups.cells[start + k // 3]]
         x_from, y_from = path(key, owner, k % 3, step, first)
         x_to, y_to = path(key, owner, k % 3, step, last)
         noise[2 * k] = math.sqrt(dt) * (x_to - x_from)
         noise[2 * k + 1] = math.sqrt(dt) * (y_to - y_from)
 
 
-@compiled_lean
-def longest_part(group: int, dt: float, energy: float, system: System, gaps: Array) -> int:
-    """Give over how many ticks of a sub-step of dt heat, kT = `energy`, may move a group at gaps (N,).
+@compiled_where_present(otherwise=TICKS)
+def longest_part(thermal: Thermal, group: int, dt: float, system: System, gaps: Array) -> int:
+    """Give over how many ticks of a sub-step of dt heat may move a group at gaps (N,).
 
     A lone cell's mobility across the gap g is at most min(g/a, 1)/(6πηa).
     """
@@ -81,31 +83,29 @@ def longest_part(group: int, dt: float, energy: float, system: System, gaps: Arr
         cell = system.groups.cells[i]
         radius, gap = bodies.radius[cell], gaps[cell] + bodies.wall_offset
         mobility = min(gap / radius, 1.0) / (6 * math.pi * bodies.viscosity * radius)
-        square = 2 * energy * mobility * dt / TICKS
+        square = 2 * thermal.energy * mobility * dt / TICKS
         while ticks > 1 and square * ticks > (RMS_SHARE * gap) ** 2:
             ticks //= 2
     return ticks
 
 
-@compiled_lean
-def shake(group: int, dt: float, energy: float, system: System, gaps: Array, work: Work) -> bool:
+@compiled_where_present(otherwise=True)
+def shake(thermal: Thermal, group: int, dt: float, system: System, gaps: Array, work: Work) -> bool:
     """Write a group's resistance at the midpoint, and the random load beside it; tell whether dt is short enough.
 
     Parameters
     ----------
-    energy
-        kT, pN µm.
     gaps : (N,)
         Of all cells to the wall, at the start.
     work
         Its noise is from `draw`, over dt; matrix and right are written.
     """
     matrix, right, noise, push, star, middle = work.matrix, work.right, work.noise, work.push, work.star, work.gaps
-    resistance(group, system, gaps, work.functions, matrix, right)
+    resistance(group, system.bodies, system.groups, gaps, work.functions, matrix, right)
     m = matrix.shape[0]
     if not is_positive_definite(matrix):
         return False
-    strength = math.sqrt(2 * energy) / dt
+    strength = math.sqrt(2 * thermal.energy) / dt
     for i in range(m):
         push[i] = 0.0
         for j in range(i + 1):
@@ -121,7 +121,7 @@ def shake(group: int, dt: float, energy: float, system: System, gaps: Array, wor
         if not abs(change) <= SHAKEN_SHARE * (gaps[cell] + system.bodies.wall_offset):
             return False
         middle[cell] = gaps[cell] + change
-    resistance(group, system, middle, work.functions, matrix, right)
+    resistance(group, system.bodies, system.groups, middle, work.functions, matrix, right)
     for i in range(m):
         right[i] += push[i]
     return True
