@@ -127,6 +127,9 @@ def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
     return kernel
 
 
+_PART: Any = _LEAN | {"cache": False}  # kept with the kernels that call it
+
+
 class Absent(NamedTuple):
     """What stands where data of an effect would, if the scene leaves the effect out."""
 
@@ -155,14 +158,15 @@ def compiled_where_present(otherwise: Any = None) -> Callable[[Callable[P, R]], 
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         names = ", ".join(signature(function).parameters)
-        kernel = compiled_lean(function)
-        # overloads have the names of what they stand for, and are put into the code that calls them
-        present = eval(f"lambda {names}: kernel({names})", {"kernel": kernel})
-        nothing = eval(f"lambda {names}: otherwise", {"otherwise": otherwise})
+        nothing = eval(f"lambda {names}: otherwise", {"otherwise": otherwise})  # numba wants the very same names
 
-        @overload(function, inline="always", strict=False)
-        def choose(effect: Any, *others: Any) -> Any:
-            return nothing if _is_absent(effect) else present
+        @overload(function, strict=False, jit_options=_PART)
+        def where_present(effect: Any, *others: Any) -> Any:
+            return None if _is_absent(effect) else function
+
+        @overload(function, strict=False, jit_options=_PART | {"forceinline": True})
+        def where_absent(effect: Any, *others: Any) -> Any:
+            return nothing if _is_absent(effect) else None
 
         return function
 

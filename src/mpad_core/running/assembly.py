@@ -36,6 +36,7 @@ from mpad_core.running.layout import (
     Thermal,
     Trail,
 )
+from mpad_core.running.moving import refresh_turns
 from mpad_core.running.places import MOST_LIGANDS, SQUARE
 from mpad_core.running.reacting import list_bridges
 from mpad_core.running.shaking import TICKS
@@ -192,17 +193,18 @@ def system(problem: Problem, fixed: Fixed, state: State, coupling: Coupling, rea
         groups=groups,
         contacts=contacts if problem.contact is not None else absent(Contacts),
         thermal=fixed.thermal,
-        binding=_binding(problem, fixed, pairs, around) if problem.species else absent(Binding),
+        binding=_binding(problem, fixed, pairs, state, around) if problem.species else absent(Binding),
     )
 
 
-def _binding(problem: Problem, fixed: Fixed, pairs: Indices, around: Densities) -> Binding:
+def _binding(problem: Problem, fixed: Fixed, pairs: Indices, state: State, around: Densities) -> Binding:
     """Put what may bind to what together; `pairs` (P, 2) are those of cells that may meet during the burst."""
-    cells, molecules, species = len(problem.radii), fixed.molecules, fixed.species
+    molecules, species, turns = fixed.molecules, fixed.species, np.empty((len(problem.radii), 3, 3))
+    refresh_turns(motion_of(state), turns)  # held cells stay on the bench as they are at first
     bridging = (species.partner_kind >= 0).any() & (np.diff(molecules.first) > 0)[pairs].all(axis=1)
     neighbours = neighbours_of(problem, pairs[bridging])
     factor, levers, ends = np.empty(len(problem.species)), np.empty((2, 3, 6)), np.empty((3, 3))
-    bench = Bench(factor, levers, ends, np.empty((cells, 3)), np.empty((cells, 3, 3)))
+    bench = Bench(factor, levers, ends, state.centres.copy(), turns)
     shell = problem.radii + problem.roughness
     return Binding(shell, problem.wall_roughness, molecules, species, neighbours, around, bench)
 
@@ -270,6 +272,7 @@ def _no_bonds(first: Indices, counts: Indices) -> Bonds:
 
 
 def _candidates(fixed: Fixed, neighbours: Neighbours | None, times: int) -> Candidates:
+    """Make room for lists, none of which has been made."""
     sites = np.diff(fixed.molecules.first)
     partner = np.zeros(0, np.int64) if neighbours is None else neighbours.partner
     keeper = (
@@ -284,8 +287,8 @@ def _candidates(fixed: Fixed, neighbours: Neighbours | None, times: int) -> Cand
     return Candidates(
         first, np.zeros(cells, np.int64), site, species, ligand, other, np.zeros(room), np.zeros(room),
         fixed.molecules.first,
-        np.zeros(cells, np.int64), np.empty(int(sites.sum()), np.int64), np.zeros((cells, 3)), np.zeros((cells, 3)),
-        np.zeros((cells, 3, 3)), np.zeros((cells, 3, 3)), facing, np.zeros(2 * pairs, np.int64),
+        np.full(cells, -1), np.empty(int(sites.sum()), np.int64), np.zeros((cells, 3)), np.zeros((cells, 3)),
+        np.zeros((cells, 3, 3)), np.zeros((cells, 3, 3)), facing, np.full(2 * pairs, -1),
         np.empty(int(facing[-1]), np.int64), np.zeros((pairs, 3)), np.zeros((pairs, 3, 9)),
     )  # fmt: skip
 
@@ -297,9 +300,9 @@ def bond_list(bonds: Bonds) -> BondList:
     return BondList(cell=cell, **{name: getattr(bonds, name)[places] for name in _BOND_FIELDS})
 
 
-def clocks_of(state: State) -> Clocks:
+def clocks_of(fixed: Fixed, state: State) -> Clocks:
     """Copy the clocks of events."""
-    return Clocks(state.clocks.copy(), state.draws.astype(np.int64))
+    return Clocks(state.clocks.copy(), state.draws.astype(np.int64), fixed.molecules.owner)
 
 
 def progress_of(groups: int, cells: int) -> Progress:

@@ -17,9 +17,9 @@ from mpad_core.numerics.compiled import (
     compiled_within,
     is_present,
 )
+from mpad_core.numerics.streams import Word
 from mpad_core.running.awaiting import (
     all_ready,
-    begin,
     bonds_of,
     happen_explicitly,
     let_happen,
@@ -31,7 +31,20 @@ from mpad_core.running.awaiting import (
     wait,
 )
 from mpad_core.running.densities import holds
-from mpad_core.running.layout import Bodies, Course, Groups, Work
+from mpad_core.running.layout import (
+    Binding,
+    Bodies,
+    Bonds,
+    Course,
+    Groups,
+    Limits,
+    Motion,
+    Places,
+    Progress,
+    System,
+    Trail,
+    Work,
+)
 from mpad_core.running.moving import advance, commit, refresh_turns, step_explicitly
 from mpad_core.running.resisting import is_positive_definite, resistance
 from mpad_core.running.shaking import TICKS, draw, longest_part
@@ -68,13 +81,13 @@ def _work_for(
 
 
 @compiled_lean
-def _try_part(group: int, part: int, tick: int, course: Course, work: Work) -> float:
-    """Try to move a group over a part of the sub-step, in ticks; give the error of its motion, see `advance`."""
-    length, system, dice = course.limits.sub_step, course.system, course.dice
-    step = dice.step + course.progress.beats[0] * dice.stride
-    draw(system.thermal, group, system.groups, dice.key, step, tick, tick + part, length, work.noise)
-    bonds = bonds_of(course.adhesion)
-    return advance(group, length * part / TICKS, system, bonds, course.motion, course.turn, work)
+def _try_part(
+    group: int, part: int, tick: int, length: float, step: int, key: Word, system: System, bonds: Bonds, motion: Motion,
+    turn: Array, work: Work,
+) -> float:  # fmt: skip
+    """Try to move a group over a part of the sub-step at `step`, in ticks; give the error of its motion (`advance`)."""
+    draw(system.thermal, group, system.groups, key, step, tick, tick + part, length, work.noise)
+    return advance(group, length * part / TICKS, system, bonds, motion, turn, work)
 
 
 @compiled_lean
@@ -97,38 +110,49 @@ def _longer(error: float, most: float, shaken: bool) -> float:
 @compiled_lean
 def _move_group(group: int, course: Course, work: Work) -> int:
     """Move a group to the end of the sub-step that is under way, in as many parts as it takes."""
-    system, progress, binding = course.system, course.progress, course.system.binding
+    system, motion, turn, progress, dice = course.system, course.motion, course.turn, course.progress, course.dice
+    binding, adhesion, groups, radius = system.binding, course.adhesion, system.groups, system.bodies.radius
     length, most, shaken = course.limits.sub_step, course.limits.error, is_present(system.thermal)
+    step = dice.step + progress.beats[0] * dice.stride
+    now, to = Places(motion.centre, motion.turn, turn), Places(work.centre, work.rotation, work.turn)
+    bonds, recorded = bonds_of(adhesion), progress.events
     while progress.tick[group] < TICKS:
-        if not all_ready(binding, group, system.groups, course):
+        if not all_ready(binding, adhesion, group, recorded, groups, now, dice):
             return ROOM_NEEDED
         tick = progress.tick[group]
         part = min(progress.part[group], TICKS - tick)
-        part = min(part, longest_part(system.thermal, group, length, system, course.motion.gap))
+        part = min(part, longest_part(system.thermal, group, length, system.bodies, groups, motion.gap))
         dt = length * part / TICKS
-        error = _try_part(group, part, tick, course, work)
+        error = _try_part(group, part, tick, length, step, dice.key, system, bonds, motion, turn, work)
         shorter = _shorter(error, most, shaken)
-        if shorter == 1.0 and strays(binding, group, course, work):
+        if shorter == 1.0 and strays(binding, adhesion, group, groups, now, to):
             shorter = 0.5
-        if shorter == 1.0 and not see_ahead(binding, group, course, work):
+        if shorter == 1.0 and not see_ahead(binding, adhesion, group, recorded, groups, now, to, dice):
             return ROOM_NEEDED
-        share, whose = (1.0, -1) if shorter < 1.0 else look_ahead(binding, group, dt, course, work)
+        share, whose = 1.0, -1
+        if shorter == 1.0:
+            share, whose = look_ahead(
+                binding, adhesion, group, dt, course.limits.rate, groups, radius, motion.gap, work.velocity, now, to
+            )
         if shorter < 1.0 or share < 0:
             if part == 1:
                 return NO_BALANCE
             progress.part[group] = max(int(part * min(shorter, 0.5 if share < 0 else 1.0)), 1)
             continue
         done = part if whose < 0 else min(max(math.ceil(share * part), 1), part)
-        if done < part and _try_part(group, done, tick, course, work) == math.inf:
-            progress.part[group] = max(done // 2, 1)
-            continue
-        use_up(binding, group, share, dt, whose, course)
-        commit(group, length * done / TICKS, system.groups, course.motion, course.turn, work)
+        if done < part:
+            again = _try_part(group, done, tick, length, step, dice.key, system, bonds, motion, turn, work)
+            if again == math.inf:
+                progress.part[group] = max(done // 2, 1)
+                continue
+        use_up(adhesion, group, share, dt, whose, groups, dice.key)
+        commit(group, length * done / TICKS, groups, motion, turn, work)
         progress.part[group] = min(int(part * _longer(error, most, shaken)) + 1, TICKS)
         if whose >= 0:
-            place = 6 * system.groups.place[whose]
-            pulled = let_happen(binding, whose, (tick + share * part) / TICKS, work.velocity[place : place + 6], course)
-            progress.part[group] = _RELAXING if pulled else progress.part[group]
+            place, when = 6 * groups.place[whose], (tick + share * part) / TICKS
+            own, height = work.velocity[place : place + 6], radius[whose] + motion.gap[whose]
+            if let_happen(binding, adhesion, whose, when, own, height, step, dice.key, recorded, now):
+                progress.part[group] = _RELAXING
         progress.tick[group] = tick + done
     return REACHED
 
@@ -139,29 +163,50 @@ def _move_explicitly(euler: float, group: int, course: Course, work: Work) -> in
 
     Rates are those of the start of every few steps, and an event happens at the end of the step in which it is due.
     """
-    system, progress, binding = course.system, course.progress, course.system.binding
+    system, motion, turn, progress, dice = course.system, course.motion, course.turn, course.progress, course.dice
+    binding, adhesion, groups, radius = system.binding, course.adhesion, system.groups, system.bodies.radius
     steps = max(round(course.limits.sub_step / euler), 1)
-    dt = course.limits.sub_step / steps
+    dt, step = course.limits.sub_step / steps, dice.step + progress.beats[0] * dice.stride
+    now, bonds, recorded = Places(motion.centre, motion.turn, turn), bonds_of(adhesion), progress.events
+    gap, velocity = motion.gap, motion.velocity
     while progress.tick[group] < TICKS:
-        if not all_ready(binding, group, system.groups, course):
+        if not all_ready(binding, adhesion, group, recorded, groups, now, dice):
             return ROOM_NEEDED
         done = progress.part[group] % TICKS  # steps of this sub-step
-        use_up_explicitly(binding, group, done, dt, course)
-        step_explicitly(group, dt, system, bonds_of(course.adhesion), course.motion, course.turn, work)
-        commit(group, dt, system.groups, course.motion, course.turn, work)
-        happen_explicitly(binding, group, (done + 1) / steps, course)
+        use_up_explicitly(binding, adhesion, group, done, dt, groups, radius, gap, velocity, now)
+        step_explicitly(group, dt, system, bonds, motion, turn, work)
+        commit(group, dt, groups, motion, turn, work)
+        happen_explicitly(
+            binding, adhesion, group, (done + 1) / steps, groups, radius, gap, velocity, step, recorded, now, dice
+        )
         progress.part[group] = done + 1 if done + 1 < steps else TICKS
         progress.tick[group] = (done + 1) * (TICKS // steps) if done + 1 < steps else TICKS
     return REACHED
 
 
+@compiled_within
+def _wait(cell: int, slot: int, at_rest: Array, course: Course) -> bool:
+    """Let happen what happens to a cell that does not move, up to the end of the sub-step; tell if there was room."""
+    motion, progress, dice = course.motion, course.progress, course.dice
+    step, now = dice.step + progress.beats[0] * dice.stride, Places(motion.centre, motion.turn, course.turn)
+    height, ready = course.system.bodies.radius[cell] + motion.gap[cell], True
+    while ready and progress.tick[slot] < TICKS:
+        left = TICKS - progress.tick[slot]
+        ready, share = wait(
+            course.system.binding, course.adhesion, cell, progress.tick[slot] / TICKS, course.limits.sub_step, at_rest,
+            height, step, progress.events, now, dice,
+        )  # fmt: skip
+        if ready:
+            progress.tick[slot] += min(max(math.ceil(share * left), 1), left) if share <= 1 else left
+    return ready
+
+
 @compiled_lean
-def _must_end(course: Course) -> bool:
+def _must_end(binding: Binding, motion: Motion, limits: Limits) -> bool:
     """Tell whether the frozen coupling has been used far enough, or a cell leaves the lattice of the wall."""
-    motion, limits = course.motion, course.limits
     start = limits.start
     for cell in range(start.shape[0]):
-        if not holds(course.system.binding, cell, motion.centre[cell, 0], motion.centre[cell, 1]):
+        if not holds(binding, cell, motion.centre[cell, 0], motion.centre[cell, 1]):
             return True
         if motion.gap[cell] < limits.gap_low[cell] or motion.gap[cell] > limits.gap_high[cell]:
             return True
@@ -176,24 +221,24 @@ def _must_end(course: Course) -> bool:
 
 
 @compiled_lean
-def _fits(group: int, course: Course, work: Work) -> bool:
+def _fits(group: int, bodies: Bodies, groups: Groups, gaps: Array, work: Work) -> bool:
     """Tell whether a group's frozen coupling fits its heights."""
-    resistance(
-        group, course.system.bodies, course.system.groups, course.motion.gap, work.functions, work.matrix, work.right
-    )
+    resistance(group, bodies, groups, gaps, work.functions, work.matrix, work.right)
     return is_positive_definite(work.matrix)
 
 
-@compiled
-def _note(course: Course) -> None:
+@compiled_lean
+def _note(step: int, motion: Motion, progress: Progress, trail: Trail) -> None:
     """Note where the cells are."""
-    motion, trail, progress = course.motion, course.trail, course.progress
     at = progress.trail[0]
-    trail.step[at] = progress.beats[0] * course.dice.stride
-    trail.centre[at] = motion.centre
-    trail.gap[at] = motion.gap
-    trail.orientation[at] = motion.orientation
-    trail.turn[at] = motion.turn
+    trail.step[at] = step
+    for cell in range(motion.gap.shape[0]):
+        trail.gap[at, cell] = motion.gap[cell]
+        for i in range(3):
+            trail.centre[at, cell, i] = motion.centre[cell, i]
+            trail.turn[at, cell, i] = motion.turn[cell, i]
+        for i in range(4):
+            trail.orientation[at, cell, i] = motion.orientation[cell, i]
     progress.trail[0] = at + 1
 
 
@@ -204,7 +249,7 @@ def _sub_step(course: Course, works: list[Work], at_rest: Array) -> tuple[int, i
     number = groups.first.shape[0] - 1
     for group in range(number):
         work = works[group]
-        if progress.tick[group] == 0 and not _fits(group, course, work):
+        if progress.tick[group] == 0 and not _fits(group, course.system.bodies, groups, course.motion.gap, work):
             return NOT_POSITIVE, group
         if is_present(euler):
             outcome = _move_explicitly(euler, group, course, work)
@@ -213,7 +258,7 @@ def _sub_step(course: Course, works: list[Work], at_rest: Array) -> tuple[int, i
         if outcome != REACHED:
             return outcome, group
     for cell in range(groups.place.shape[0]):
-        if groups.place[cell] < 0 and not wait(course.system.binding, cell, number + cell, at_rest, course):
+        if groups.place[cell] < 0 and not _wait(cell, number + cell, at_rest, course):
             return ROOM_NEEDED, -1
     return REACHED, -1
 
@@ -234,7 +279,6 @@ def burst(course: Course) -> tuple[int, int]:
     """
     progress, limits = course.progress, course.limits
     refresh_turns(course.motion, course.turn)
-    begin(course.system.binding, course)
     works = _works(course)
     at_rest = np.zeros(6)
     while progress.beats[0] < limits.most:
@@ -243,9 +287,9 @@ def burst(course: Course) -> tuple[int, int]:
             return outcome, group
         progress.beats[0] += 1
         progress.tick[:] = 0
-        ends = _must_end(course) or progress.beats[0] == limits.most
+        ends = _must_end(course.system.binding, course.motion, limits) or progress.beats[0] == limits.most
         if ends or progress.beats[0] % course.trail.every == 0:
-            _note(course)
+            _note(progress.beats[0] * course.dice.stride, course.motion, progress, course.trail)
         if ends:
             break
     return REACHED, -1

@@ -164,11 +164,20 @@ class Work(NamedTuple):
     turn: Array  # (N, 3, 3) rotation matrices
 
 
+class Places(NamedTuple):
+    """Where all cells are."""
+
+    centre: Array  # (N, 3) µm
+    rotation: Array  # (N, 3) angular velocity, integrated over time since the burst began
+    turn: Array  # (N, 3, 3) rotation matrices
+
+
 class Clocks(NamedTuple):
     """Each cell's clock of events: the next one happens when the hazard integrated since the last has used it up."""
 
     left: Array  # (N,) of a random number that is exponential with mean one
     number: Indices  # (N,) of numbers drawn so far, by which the next ones are keyed
+    owner: Indices  # (N,) each cell's identity in draws, as in Molecules
 
 
 class Progress(NamedTuple):

@@ -132,7 +132,7 @@ def _burst(machine: Machine, state: State, coupling: Coupling, bounds: Limits, s
     problem, fixed = machine.problem, machine.fixed
     around = machine.rasters.at(state.centres)
     data = assembly.system(problem, fixed, state, coupling, contact_range(problem), around)
-    motion, clocks = assembly.motion_of(state), assembly.clocks_of(state)
+    motion, clocks = assembly.motion_of(state), assembly.clocks_of(fixed, state)
     cells = len(state.wall_gaps)
     progress, trail = assembly.progress_of(len(coupling.groups), cells), assembly.trail_for(cells, bounds.most)
     dice = Dice(fixed.key, state.step, stride)

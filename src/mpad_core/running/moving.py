@@ -339,7 +339,7 @@ def advance(group: int, dt: float, system: System, bonds: Bonds, motion: Motion,
     if not is_present(system.thermal):
         _lead(group, dt, system, motion, work.gaps)
         resistance(group, system.bodies, system.groups, work.gaps, work.functions, work.matrix, work.right)
-    if not shake(system.thermal, group, dt, system, motion.gap, work):
+    if not shake(system.thermal, group, dt, system.bodies, system.groups, motion.gap, work):
         return math.inf
     for place in range(n):
         for i in range(6):

@@ -2,12 +2,12 @@
 
 import math
 
-from mpad_core.arrays import Array, Flags
+from mpad_core.arrays import Array, Flags, Indices
 from mpad_core.numerics.compiled import compiled_inline, compiled_lean
 from mpad_core.numerics.streams import Stream, Word, mixed, uniform
 from mpad_core.numerics.tables import value
 from mpad_core.running.densities import density_at
-from mpad_core.running.layout import Binding, Bonds, Candidates, Clocks, Molecules, Progress, Species
+from mpad_core.running.layout import Binding, Bonds, Candidates, Clocks, Molecules, Species
 from mpad_core.running.places import distance, place_of
 
 _ANCHORS = int(Stream.ANCHORS)
@@ -135,10 +135,10 @@ def rates(
 @compiled_lean
 def _record(
     kind: int, bond: int, cell: int, length: float, step: int, time: float, binding: Binding, bonds: Bonds,
-    progress: Progress, events: Array,
+    recorded: Indices, events: Array,
 ) -> None:  # fmt: skip
     """Append an event at a time since the burst began."""
-    event = events[progress.events[0]]
+    event = events[recorded[0]]
     partner = bonds.partner[bond]
     ligand = bonds.ligand[bond]
     table = binding.species.first[bonds.species[bond]] + bonds.state[bond]
@@ -155,7 +155,7 @@ def _record(
     event.anchor_y = bonds.anchor[bond, 1]
     event.length = length
     event.force = value(binding.species.tables, table, TENSION, length)
-    progress.events[0] += 1
+    recorded[0] += 1
 
 
 @compiled_lean
@@ -256,7 +256,7 @@ def _born_state(kind: int, length: float, share: float, binding: Binding) -> int
 @compiled_lean
 def happen(
     cell: int, which: int, excess: float, step: int, time: float, centre: Array, turn: Array, key: Word,
-    binding: Binding, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, progress: Progress, events: Array,
+    binding: Binding, bonds: Bonds, bound: Flags, listed: Candidates, clocks: Clocks, recorded: Indices, events: Array,
 ) -> None:  # fmt: skip
     """Let the event happen that `rates` stopped at, and record it; nothing if the wall's molecule is bound already."""
     count = bonds.number[cell]
@@ -269,22 +269,22 @@ def happen(
             and _is_taken(kind, listed.ligand[candidate], bonds)
         ):
             return
-        who = mixed(binding.molecules.owner[cell], clocks.number[cell])
+        who = mixed(clocks.owner[cell], clocks.number[cell])
         bond = _bind(
             candidate, cell, 2 * math.pi * uniform(key, _ANCHORS, who, 0), centre, turn, binding, bonds, bound, listed
         )
         length = bond_length(bond, cell, centre, turn, bonds, binding.molecules)
         bonds.state[bond] = _born_state(kind, length, uniform(key, _ANCHORS, who, 1), binding)
-        _record(FORMED, bond, cell, length, step, time, binding, bonds, progress, events)
+        _record(FORMED, bond, cell, length, step, time, binding, bonds, recorded, events)
         return
     bond = bonds.first[cell] + which
     length = bond_length(bond, cell, centre, turn, bonds, binding.molecules)
     to = _changed(bond, length, excess, binding, bonds)
     if to >= 0:
         bonds.state[bond] = to
-        _record(CHANGED, bond, cell, length, step, time, binding, bonds, progress, events)
+        _record(CHANGED, bond, cell, length, step, time, binding, bonds, recorded, events)
     else:
-        _record(BROKEN, bond, cell, length, step, time, binding, bonds, progress, events)
+        _record(BROKEN, bond, cell, length, step, time, binding, bonds, recorded, events)
         _drop(bond, cell, bonds, bound)
 
 

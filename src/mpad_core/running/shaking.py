@@ -26,7 +26,7 @@ import math
 from mpad_core.arrays import Array
 from mpad_core.numerics.compiled import compiled_lean, compiled_where_present
 from mpad_core.numerics.streams import Stream, Word, mixed, normal_pair
-from mpad_core.running.layout import Groups, System, Thermal, Work
+from mpad_core.running.layout import Bodies, Groups, Thermal, Work
 from mpad_core.running.resisting import is_positive_definite, resistance
 
 TICKS = 1 << 30  # a sub-step is never split finer, and events fall on these: 1 ps of 1 ms
@@ -72,15 +72,14 @@ def draw(
 
 
 @compiled_where_present(otherwise=TICKS)
-def longest_part(thermal: Thermal, group: int, dt: float, system: System, gaps: Array) -> int:
+def longest_part(thermal: Thermal, group: int, dt: float, bodies: Bodies, groups: Groups, gaps: Array) -> int:
     """Give over how many ticks of a sub-step of dt heat may move a group at gaps (N,).
 
     A lone cell's mobility across the gap g is at most min(g/a, 1)/(6πηa).
     """
     ticks = TICKS
-    bodies = system.bodies
-    for i in range(system.groups.first[group], system.groups.first[group + 1]):
-        cell = system.groups.cells[i]
+    for i in range(groups.first[group], groups.first[group + 1]):
+        cell = groups.cells[i]
         radius, gap = bodies.radius[cell], gaps[cell] + bodies.wall_offset
         mobility = min(gap / radius, 1.0) / (6 * math.pi * bodies.viscosity * radius)
         square = 2 * thermal.energy * mobility * dt / TICKS
@@ -90,7 +89,7 @@ def longest_part(thermal: Thermal, group: int, dt: float, system: System, gaps: 
 
 
 @compiled_where_present(otherwise=True)
-def shake(thermal: Thermal, group: int, dt: float, system: System, gaps: Array, work: Work) -> bool:
+def shake(thermal: Thermal, group: int, dt: float, bodies: Bodies, groups: Groups, gaps: Array, work: Work) -> bool:
     """Write a group's resistance at the midpoint, and the random load beside it; tell whether dt is short enough.
 
     Parameters
@@ -101,7 +100,7 @@ def shake(thermal: Thermal, group: int, dt: float, system: System, gaps: Array, 
         Its noise is from `draw`, over dt; matrix and right are written.
     """
     matrix, right, noise, push, star, middle = work.matrix, work.right, work.noise, work.push, work.star, work.gaps
-    resistance(group, system.bodies, system.groups, gaps, work.functions, matrix, right)
+    resistance(group, bodies, groups, gaps, work.functions, matrix, right)
     m = matrix.shape[0]
     if not is_positive_definite(matrix):
         return False
@@ -116,12 +115,12 @@ def shake(thermal: Thermal, group: int, dt: float, system: System, gaps: Array, 
             star[i] -= matrix[j, i] * star[j]
         star[i] /= matrix[i, i]
     for place in range(m // 6):
-        cell = system.groups.cells[system.groups.first[group] + place]
+        cell = groups.cells[groups.first[group] + place]
         change = 0.5 * dt * star[6 * place + 2]
-        if not abs(change) <= SHAKEN_SHARE * (gaps[cell] + system.bodies.wall_offset):
+        if not abs(change) <= SHAKEN_SHARE * (gaps[cell] + bodies.wall_offset):
             return False
         middle[cell] = gaps[cell] + change
-    resistance(group, system.bodies, system.groups, middle, work.functions, matrix, right)
+    resistance(group, bodies, groups, middle, work.functions, matrix, right)
     for i in range(m):
         right[i] += push[i]
     return True
