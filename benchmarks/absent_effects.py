@@ -1,8 +1,8 @@
-"""What an effect costs that is not there: the burst with empty tables against one that never knew the effect.
+"""What an effect costs that is not there: the burst of a scene without it against one that never knew the effect.
 
-The burst treats an absent effect as tables and lists of length zero, and never asks. Here the same sources are compiled
-once more with every call and loop that belongs to bonds, contacts and thermal motion struck out, and both are timed in
-turn (CPU time of the thread) on scenes without any; they must also give the same bits. Then each part by itself.
+For an absent effect the burst is compiled without what belongs to it. Here the same sources are compiled once more with
+every call that belongs to bonds, contacts and thermal motion struck out, and both are timed in turn (CPU time of the
+thread) on scenes without any; they must also give the same bits. Then each part by itself.
 
     python benchmarks/absent_effects.py [--repeats 31] [--sub-steps 2000] [WHAT …]
 """
@@ -10,7 +10,6 @@ turn (CPU time of the thread) on scenes without any; they must also give the sam
 import argparse
 import ast
 import inspect
-import re
 import statistics
 import time
 from collections.abc import Sequence
@@ -19,7 +18,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from mpad_core.running import assembly, burst, march, moving, pace
+from mpad_core.numerics.compiled import compiled_where_present, is_present
+from mpad_core.running import assembly, burst, march, moving, pace, pulling
 from mpad_core.running.initial import at_rest
 from mpad_core.running.layout import Course, Dice
 from mpad_core.scene.compose import compose
@@ -43,44 +43,44 @@ kind = "bead"
 x = "-14 um"
 height = "6 um"
 """
-STRUCK = {  # what each bare burst does without: calls, loops over what is absent, and conditions
-    "everything": ("_all_ready", "_strays", "_see_ahead", "_look_ahead", "_use_up", "bonds.number", "holds",
-                   "contacts.pair_first", "contacts.reach", "thermal.energy"),
-    "reactions": ("_all_ready", "_strays", "_see_ahead", "_look_ahead", "_use_up"),
-    "loads of bonds": ("bonds.number",),
-    "contacts": ("contacts.pair_first", "contacts.reach"),
-    "thermal motion": ("thermal.energy",),
-}  # fmt: skip
+PARTS = {  # functions that each bare burst does without
+    "reactions": ("all_ready", "strays", "see_ahead", "look_ahead", "use_up", "let_happen", "_wait", "holds"),
+    "loads of bonds": ("_add_bonds",),
+    "contacts": ("_add_wall_contact", "_add_pair_contacts"),
+    "thermal motion": ("draw", "shake", "longest_part"),
+}
+STRUCK = {"everything": tuple(name for names in PARTS.values() for name in names), **PARTS}
 DECORATORS = ("compiled", "compiled_lean", "compiled_inline", "compiled_within")
 
 
 class Striking(ast.NodeTransformer):
-    """Strikes out calls by name, loops over what is absent, and conditions that ask for it."""
+    """Strikes out statements and conditions that call what is gone, and has nothing ask what is present."""
 
     def __init__(self, gone: Sequence[str]) -> None:
         self.gone = gone
         self.struck = 0
 
-    def _without(self, node: Any, text: str) -> Any:
-        if any(re.search(rf"\b{re.escape(name)}\b", text) for name in self.gone):
+    def _without(self, node: Any, asked: ast.AST) -> Any:
+        calls = (part.func for part in ast.walk(asked) if isinstance(part, ast.Call))
+        if any(ast.unparse(call) in self.gone for call in calls):
             self.struck += 1
             return ast.Pass()
         self.generic_visit(node)
         return node
 
     def visit_Expr(self, node: ast.Expr) -> Any:  # the name that ast wants
-        return self._without(node, ast.unparse(node.value.func) if isinstance(node.value, ast.Call) else "")
+        return self._without(node, node)
 
-    def visit_For(self, node: ast.For) -> Any:
-        return self._without(node, ast.unparse(node.iter))
+    def visit_Assign(self, node: ast.Assign) -> Any:
+        return self._without(node, node)
 
     def visit_If(self, node: ast.If) -> Any:
-        test = ast.unparse(node.test)  # that there is no heat is asked where there is none, and stays
-        return self._without(node, "" if "thermal.energy" in test else test)
+        return self._without(node, node.test)
 
-    def visit_IfExp(self, node: ast.IfExp) -> Any:
-        """Leave what stands where nothing is asked for."""
-        return node.body if isinstance(self._without(node, ast.unparse(node.orelse)), ast.Pass) else node
+    def visit_Call(self, node: ast.Call) -> Any:
+        self.generic_visit(node)
+        asks = self.gone and ast.unparse(node.func) == "is_present"
+        return ast.Constant(value=False) if asks else node
 
 
 def without(module: Any, gone: Sequence[str], others: dict[str, Any]) -> tuple[dict[str, Any], int]:
@@ -92,7 +92,8 @@ def without(module: Any, gone: Sequence[str], others: dict[str, Any]) -> tuple[d
         if isinstance(function, ast.FunctionDef):
             striking.visit(function)
     space: dict[str, Any] = {**others, "__name__": f"{module.__name__}_bare", **dict.fromkeys(DECORATORS, plainly)}
-    space |= {"compiled": counting, "compiled_within": within}
+    space |= {"compiled": counting, "compiled_within": within, "is_present": is_present}
+    space["compiled_where_present"] = compiled_where_present
     exec(compile(ast.fix_missing_locations(tree), f"<{module.__name__}, bare>", "exec"), space)
     return space, striking.struck
 
@@ -120,10 +121,11 @@ def within(function: Any) -> Any:
 
 def bare_burst(gone: Sequence[str]) -> Any:
     """Give a burst that never knew what is gone."""
-    moving_names, in_moving = without(moving, gone, {})
+    pulling_names, in_pulling = without(pulling, gone, {})
+    moving_names, in_moving = without(moving, gone, {"add_loads": pulling_names["add_loads"]})
     own = {name: moving_names[name] for name in ("advance", "commit", "refresh_turns", "step_explicitly")}
     burst_names, in_burst = without(burst, gone, own)
-    assert in_moving + in_burst >= len(gone), f"not all of {gone} was found"
+    assert in_pulling + in_moving + in_burst >= len(gone), f"not all of {gone} was found"
     return burst_names["burst"]
 
 
@@ -143,11 +145,12 @@ def prepared(text: str, sub_steps: int) -> Any:
 
     def once(kernel: Any) -> tuple[float, Any]:
         cells = len(state.wall_gaps)
-        room = assembly.room_for(machine.fixed, state.bonds, cells, system.neighbours)
+        room = assembly.room_for(machine.fixed, state.bonds, cells, assembly.neighbours_in(system))
+        clocks = assembly.clocks_of(machine.fixed, state)
         course = Course(
             system, limits, Dice(machine.fixed.key, 0, 1), assembly.motion_of(state), np.empty((cells, 3, 3)),
-            room.bonds, room.bound, room.candidates, assembly.clocks_of(state), np.zeros((cells, 2)),
-            assembly.progress_of(len(coupling.groups), cells), assembly.trail_for(cells, sub_steps), room.events,
+            assembly.progress_of(len(coupling.groups), cells), assembly.trail_for(cells, sub_steps),
+            assembly.adhesion_of(problem, room, clocks, np.zeros((cells, 2))),
         )  # fmt: skip
         began = time.thread_time()
         kernel(course)

@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from bridged import SHELL, bond_loads, bonded, matrices_of, problem_of, with_molecules
 from mpad_core.physics.coupling import Coupling, contact_range, joined
-from mpad_core.running import assembly, moving
+from mpad_core.running import assembly
 from mpad_core.running.layout import Work
 from mpad_core.running.march import configuration_of, make_ready
+from mpad_core.running.pulling import add_loads
 
 
 class Bench:
@@ -36,7 +37,7 @@ class Bench:
 
     def loads(self, moved: Any) -> tuple[Any, Any]:
         self.work.moved[:] = moved
-        moving._add_loads(0, self.system, self.bonds, self.motion, self.turn, self.work)
+        add_loads(0, self.system, self.bonds, self.motion, self.turn, self.work)
         return self.work.load.copy(), self.work.stiffness.copy()
 
 

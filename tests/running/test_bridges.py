@@ -269,8 +269,9 @@ def test_rooms_that_are_too_small_change_nothing(lab: Any, same: Any, scheme: st
     tightly = lab.states(make_again(lab, machine), until) if scheme != "passing" else lab.states(machine, until)
     assert same(tightly[-1], roomy[-1])
     assert sum(len(s.events) for s in roomy) > 30
-    assert max(asked) >= 4  # bonds or candidates ran out, and were given more room
-    assert len(asked) > len(roomy) + asked.count(4)  # so did the table of events, which does not grow
+    grown = sum(after > before for before, after in pairwise(asked))  # where bonds or candidates had no room
+    emptied = len(asked) - (len(tightly) - 1) - grown  # where the table of events was full
+    assert min(grown, emptied) > 0
 
 
 def test_without_bonds_between_cells_their_sites_change_nothing(lab: Any, same: Any) -> None:

@@ -12,6 +12,7 @@ from mpad_core.numerics.streams import mixed, uniform
 from mpad_core.physics.coupling import lone_cell
 from mpad_core.running import assembly, moving
 from mpad_core.running.moving import advance, commit, refresh_turns
+from mpad_core.running.pulling import add_loads
 from mpad_core.running.resisting import is_positive_definite, solve_in_place
 from sub_steps import work_for
 
@@ -36,7 +37,7 @@ class Bench:
         """Give loads and stiffness of a group displaced and turned."""
         work = work_for(group, self.system, self.motion, self.turns)
         work.moved[:] = moved
-        moving._add_loads(group, self.system, self.bonds, self.motion, self.turns, work)
+        add_loads(group, self.system, self.bonds, self.motion, self.turns, work)
         return work.load, work.stiffness
 
     def advance(self, dt: float, group: int = 0) -> float:

@@ -13,7 +13,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
-from inspect import signature
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
@@ -157,8 +156,8 @@ def compiled_where_present(otherwise: Any = None) -> Callable[[Callable[P, R]], 
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        names = ", ".join(signature(function).parameters)
-        nothing = eval(f"lambda {names}: otherwise", {"otherwise": otherwise})  # numba wants the very same names
+        def nothing(*given: Any) -> Any:
+            return otherwise
 
         @overload(function, strict=False, jit_options=_PART)
         def where_present(effect: Any, *others: Any) -> Any:

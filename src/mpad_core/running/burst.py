@@ -107,12 +107,15 @@ def _longer(error: float, most: float, shaken: bool) -> float:
     return _GROWTH if shaken or error * _GROWTH**2 <= 0.8 * most else max(0.9 * math.sqrt(most / error), 0.5)
 
 
-@compiled_lean
-def _move_group(group: int, course: Course, work: Work) -> int:
-    """Move a group to the end of the sub-step that is under way, in as many parts as it takes."""
+@compiled_where_present(otherwise=REACHED)
+def _move_group(most: float, group: int, course: Course, work: Work) -> int:
+    """Move a group to the end of the sub-step that is under way, in as many parts as it takes for an error of `most`.
+
+    The error is that of the motion of a cell's surface over a part, in µm.
+    """
     system, motion, turn, progress, dice = course.system, course.motion, course.turn, course.progress, course.dice
     binding, adhesion, groups, radius = system.binding, course.adhesion, system.groups, system.bodies.radius
-    length, most, shaken = course.limits.sub_step, course.limits.error, is_present(system.thermal)
+    length, shaken = course.limits.sub_step, is_present(system.thermal)
     step = dice.step + progress.beats[0] * dice.stride
     now, to = Places(motion.centre, motion.turn, turn), Places(work.centre, work.rotation, work.turn)
     bonds, recorded = bonds_of(adhesion), progress.events
@@ -245,16 +248,15 @@ def _note(step: int, motion: Motion, progress: Progress, trail: Trail) -> None:
 @compiled_within
 def _sub_step(course: Course, works: list[Work], at_rest: Array) -> tuple[int, int]:
     """Go through what is left of the sub-step that is under way; see `burst`."""
-    groups, progress, euler = course.system.groups, course.progress, course.limits.euler
+    groups, progress, limits = course.system.groups, course.progress, course.limits
     number = groups.first.shape[0] - 1
     for group in range(number):
         work = works[group]
         if progress.tick[group] == 0 and not _fits(group, course.system.bodies, groups, course.motion.gap, work):
             return NOT_POSITIVE, group
-        if is_present(euler):
-            outcome = _move_explicitly(euler, group, course, work)
-        else:
-            outcome = _move_group(group, course, work)
+        outcome = _move_group(limits.error, group, course, work)  # one of both does nothing
+        if outcome == REACHED:
+            outcome = _move_explicitly(limits.euler, group, course, work)
         if outcome != REACHED:
             return outcome, group
     for cell in range(groups.place.shape[0]):

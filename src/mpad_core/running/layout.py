@@ -206,7 +206,7 @@ class Limits(NamedTuple):
 
     sub_step: float  # s
     most: int  # sub-steps
-    error: float  # µm, of a cell's surface over the part of a sub-step that it moves at once
+    error: float  # µm, of a cell's surface over the part of a sub-step that it moves at once; absent for explicit steps
     rate: float  # relative, of the rates of events
     euler: float  # s, step of the explicit scheme; absent for the implicit one
     start: Array  # (N, 3) µm, centres when the coupling was frozen

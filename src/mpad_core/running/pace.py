@@ -160,8 +160,8 @@ def limits(
     free = problem.setting.wall & problem.coupled
     low = middle_gaps * (1 - _GAP_CHANGE) if free else np.full(len(middle_gaps), -np.inf)
     high = middle_gaps * (1 + _GAP_CHANGE) if free else np.full(len(middle_gaps), np.inf)
-    euler = pace.euler if pace.euler > 0 else absent(float)
+    error, euler = (absent(float), pace.euler) if pace.euler > 0 else (pace.error, absent(float))
     return Limits(
-        stride.grains * pace.grain, stride.sub_steps, pace.error, pace.rate, euler, centres, moves.pairs,
+        stride.grains * pace.grain, stride.sub_steps, error, pace.rate, euler, centres, moves.pairs,
         _FARTHER * moves.allowed, low, high,
     )  # fmt: skip
