@@ -253,7 +253,7 @@ def room_for(fixed: Fixed, bonds: BondList, cells: int, neighbours: Neighbours |
     bound = np.zeros(len(fixed.molecules.kind), np.uint8)
     bound[bonds.site] = 1
     bound[bonds.ligand[bonds.partner >= 0]] = 1
-    events: Any = np.zeros(_EVENTS, BOND_EVENT)
+    events: Any = np.empty(_EVENTS, BOND_EVENT)  # not written to before it is filled: that would take a while
     return Room(laid, bound, _candidates(fixed, neighbours, times), events)
 
 

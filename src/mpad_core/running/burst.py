@@ -55,14 +55,14 @@ _RELAXING = TICKS // 1024  # the part after an event that changes the loads: sti
 
 
 @compiled
-def _works(course: Course) -> list[Work]:
+def _works(bodies: Bodies, groups: Groups, motion: Motion, turn: Array) -> list[Work]:
     """Make room for the sub-steps of every group; what is laid out by cells they share, and held cells stay in it."""
-    motion, turn, cells = course.motion, course.turn, course.turn.shape[0]
+    cells = turn.shape[0]
     gaps, centre, orientation = np.empty(cells), motion.centre.copy(), motion.orientation.copy()
     rotation, turned = motion.turn.copy(), turn.copy()
     return [
-        _work_for(group, course.system.bodies, course.system.groups, gaps, centre, orientation, rotation, turned)
-        for group in range(course.system.groups.first.shape[0] - 1)
+        _work_for(group, bodies, groups, gaps, centre, orientation, rotation, turned)
+        for group in range(groups.first.shape[0] - 1)
     ]
 
 
@@ -281,7 +281,7 @@ def burst(course: Course) -> tuple[int, int]:
     """
     progress, limits = course.progress, course.limits
     refresh_turns(course.motion, course.turn)
-    works = _works(course)
+    works = _works(course.system.bodies, course.system.groups, course.motion, course.turn)
     at_rest = np.zeros(6)
     while progress.beats[0] < limits.most:
         outcome, group = _sub_step(course, works, at_rest)
