@@ -45,7 +45,7 @@ class Bench:
         work = work_for(group, self.system, self.motion, self.turns)
         error = float(advance(group, dt, self.system, self.bonds, self.motion, self.turns, work))
         if error < np.inf:
-            commit(group, dt, self.system, self.motion, self.turns, work)
+            commit(group, dt, self.system.groups, self.motion, self.turns, work)
         return error
 
 

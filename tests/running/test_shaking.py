@@ -125,10 +125,11 @@ def test_the_coupling_drift_of_a_lone_exact_cell_is_not_asked_for(lab: Any, monk
 def test_increments_over_parts_add_up_to_the_whole(lab: Any) -> None:
     machine = lab.machine(PAIR, thermal="on", solver="rpb")
     shaken = Shaken(machine, lab.start(machine))
+    thermal, groups = shaken.system.thermal, shaken.system.groups
     whole, part, total = np.empty(12), np.empty(12), np.zeros(12)
-    draw(0, shaken.system, KEY, 9, 0, TICKS, 2e-3, whole)
+    draw(thermal, 0, groups, KEY, 9, 0, TICKS, 2e-3, whole)
     for first, last in ((0, 7), (7, TICKS // 2), (TICKS // 2, TICKS - 3), (TICKS - 3, TICKS)):
-        draw(0, shaken.system, KEY, 9, first, last, 2e-3, part)
+        draw(thermal, 0, groups, KEY, 9, first, last, 2e-3, part)
         total += part
     assert total == pytest.approx(whole, abs=1e-14)
     assert len(set(np.abs(whole))) == 12

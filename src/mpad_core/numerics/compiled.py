@@ -146,8 +146,8 @@ def compiled_where_present(otherwise: Any = None) -> Callable[[Callable[P, R]], 
     """Compile as `compiled_lean` does what acts on an effect, its first argument; with an absent one, do nothing.
 
     Which of both is settled by type, when what calls the function is compiled: nothing is asked when it runs, what
-    belongs to an absent effect is not compiled, and no data of it are handed on. The function can only be called from
-    compiled code.
+    belongs to an absent effect is not compiled, and no data of it are handed on. Called from Python the function is
+    what it was.
 
     Parameters
     ----------
