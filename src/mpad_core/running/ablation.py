@@ -8,7 +8,8 @@ from attrs import define, evolve, field
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import MpadError
 from mpad_core.interfaces.values import Configuration
-from mpad_core.physics.coupling import Coupling, NoDrift
+from mpad_core.physics.couplers import NoDrift
+from mpad_core.physics.coupling import NOT_WATCHED, Coupling, Watch
 from mpad_core.physics.state import State, no_bonds
 from mpad_core.running.march import Machine, step
 
@@ -24,7 +25,9 @@ class Given:
     coupling: Coupling
     plan: None = None
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
+    def at(
+        self, configuration: Configuration, mean_loads: Array, guess: Array | None, watch: Watch = NOT_WATCHED
+    ) -> Coupling:
         """Give it."""
         return self.coupling
 

@@ -15,7 +15,8 @@ from attrs import define, evolve, field, frozen
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import MpadError
 from mpad_core.interfaces.values import Configuration
-from mpad_core.physics.coupling import Coupler, Coupling, Drift, coupler
+from mpad_core.physics.couplers import Drift, coupler
+from mpad_core.physics.coupling import NOT_WATCHED, Coupler, Coupling, Watch
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State
 from mpad_core.running.ablation import Ablation
@@ -41,10 +42,12 @@ class Heard:
         """The solver's plan, or None."""
         return self.coupler.plan
 
-    def at(self, configuration: Configuration, mean_loads: Array, guess: Array | None) -> Coupling:
+    def at(
+        self, configuration: Configuration, mean_loads: Array, guess: Array | None, watch: Watch = NOT_WATCHED
+    ) -> Coupling:
         """Give what the coupler gives."""
         began = time.perf_counter()
-        coupling = self.coupler.at(configuration, mean_loads, guess)
+        coupling = self.coupler.at(configuration, mean_loads, guess, watch)
         self.seconds += time.perf_counter() - began
         self.last = configuration, coupling
         return coupling
