@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mpad_core.interfaces.presets import Preset
     from mpad_core.interfaces.surface import Resolving, Surface
     from mpad_core.interfaces.values import AccuracyLevel, Configuration, Motion, Report, Setting, SolverTraits
+    from mpad_core.physics.fluid import fluid_velocities
     from mpad_core.physics.questions import mobility_matrix, solver, velocities
     from mpad_core.physics.state import State
     from mpad_core.plugins.hookspecs import hookimpl
@@ -31,6 +32,7 @@ _HOMES = {
     "mpad_core.running.scenes": ("states",),
     "mpad_core.records.reader": ("read_trajectory",),
     "mpad_core.physics.questions": ("solver", "mobility_matrix", "velocities"),
+    "mpad_core.physics.fluid": ("fluid_velocities",),
     "mpad_core.physics.state": ("State",),
     "mpad_core.plugins.hookspecs": ("hookimpl",),
     "mpad_core.units": ("quantity",),
@@ -74,6 +76,7 @@ __all__ = [
     "SolverTraits",
     "State",
     "Surface",
+    "fluid_velocities",
     "hookimpl",
     "load_scene",
     "mobility_matrix",

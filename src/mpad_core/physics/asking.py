@@ -9,7 +9,7 @@ from attrs import evolve
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import InputError, PartError, RefusedError
-from mpad_core.interfaces.mobility import MobilitySolver
+from mpad_core.interfaces.mobility import FluidVelocity, MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion
 
 
@@ -57,3 +57,19 @@ def solve(solver: MobilitySolver, prepared: Any, loads: Array) -> Motion:
     if not np.isfinite(velocity).all():
         raise PartError(f"{who} answered with velocities that are not finite")
     return evolve(motion, velocity=velocity.astype(np.float64, copy=False))
+
+
+def flow(solver: FluidVelocity, prepared: Any, motion: Motion, points: Array) -> Array:
+    """Let a solver tell the fluid's velocity (n, 3) at points (n, 3), and check its answer.
+
+    Raises
+    ------
+    PartError
+        If it is not finite real numbers in the shape of the points.
+    """
+    who = f"solver {getattr(solver, 'name', type(solver).__name__)!r}"
+    with blamed(who):
+        velocity = np.array(solver.flow(prepared, motion, points.copy()), np.float64)
+    if velocity.shape != points.shape or not np.isfinite(velocity).all():
+        raise PartError(f"{who} gave a flow of shape {velocity.shape} that is not finite numbers for {points.shape}")
+    return velocity

@@ -7,10 +7,11 @@ import numpy as np
 from attrs import evolve
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.interfaces.errors import InputError
+from mpad_core.interfaces.errors import InputError, RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion, Setting, SolverTraits
 from mpad_core.physics import asking
+from mpad_core.physics.given import configuration_of, held_of, loads_of, setting_of
 
 
 def solver(name: str, **parameters: Any) -> MobilitySolver:
@@ -55,46 +56,6 @@ def check_needs(
             raise InputError(f"solver {name!r} cannot treat {need}; see `mpad parts` for the others installed")
 
 
-def _numbers(what: str, values: Any) -> Array:
-    try:
-        return np.asarray(values, float)
-    except (ValueError, TypeError) as error:
-        raise InputError(f"{what} must be numbers in a regular array: {error}") from error
-
-
-def _setting(viscosity: float, shear_rate: float, wall: bool) -> Setting:
-    if not (np.isfinite(viscosity) and viscosity > 0):
-        raise InputError(f"viscosity must be positive and finite, not {viscosity}")
-    if not np.isfinite(shear_rate):
-        raise InputError(f"shear_rate must be finite, not {shear_rate}")
-    return Setting(viscosity=viscosity, shear_rate=shear_rate, wall=wall)
-
-
-def _held(held: Sequence[int], n: int) -> Indices:
-    chosen = np.asarray(held)
-    if chosen.size and chosen.dtype.kind not in "iu":
-        raise InputError(f"held must list the numbers of spheres, not {held!r}")
-    if chosen.size and (chosen.min() < 0 or chosen.max() >= n):
-        raise InputError(f"held must name spheres 0 to {n - 1}, not {held!r}")
-    return np.unique(chosen.astype(np.int64))
-
-
-def _configuration(centres: Any, radii: Any, wall: bool) -> Configuration:
-    centres = np.atleast_2d(_numbers("centres", centres))
-    radii = _numbers("radii", radii)
-    if radii.shape not in ((), (len(centres),)):
-        raise InputError(f"radii must be one number or one for each of the {len(centres)} spheres, not {radii.shape}")
-    radii = np.broadcast_to(radii, (len(centres),))
-    if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
-        raise InputError(f"centres must be (N, 3) with N at least 1, not {centres.shape}")
-    if not (np.isfinite(centres).all() and np.isfinite(radii).all() and (radii > 0).all()):
-        raise InputError("centres must be finite and radii positive")
-    if wall and (centres[:, 2] <= 0).any():
-        i = int(np.argmin(centres[:, 2]))
-        raise InputError(f"sphere {i} has its centre at z = {centres[i, 2]:g}, not above the wall z = 0")
-    return Configuration(centres=centres, radii=radii)
-
-
 def mobility_matrix(solver: MobilitySolver, centres: Any, radii: Any, *, viscosity: float, wall: bool = True) -> Array:
     """Give the mobility matrix of spheres.
 
@@ -120,8 +81,8 @@ def mobility_matrix(solver: MobilitySolver, centres: Any, radii: Any, *, viscosi
     InputError, RefusedError
         For input that makes no sense, or that the solver cannot treat.
     """
-    configuration = _configuration(centres, radii, wall)
-    setting = _setting(viscosity, 0.0, wall)
+    configuration = configuration_of(centres, radii, wall)
+    setting = setting_of(viscosity, 0.0, wall)
     check_needs(solver.traits, solver.name, configuration, setting)
     n = len(configuration.radii)
     prepared = asking.prepare(solver, solver.plan(setting), configuration)
@@ -147,6 +108,11 @@ def constrained_motion(solver: MobilitySolver, prepared: Any, loads: Array, held
         Indices of the spheres whose velocity is zero.
     unit : (6,)
         A load typical of the problem, see `unit_load`, so that neither loads nor flow drown in the other.
+
+    Raises
+    ------
+    RefusedError
+        If the held spheres' mobility is not positive definite to the digits that the solver gives.
     """
     if len(held) == 0:
         return asking.solve(solver, prepared, loads)
@@ -180,7 +146,19 @@ def _constrained(
     answer = asking.solve(solver, prepared, block)
     bare = answer.velocity[..., -1]
     columns = answer.velocity[..., :-1] - bare[..., None]
+    _check_definite(solver, columns[held].reshape(m, m) / np.tile(unit, len(held)), held)
     return answer, columns, np.asarray(np.linalg.solve(columns[held].reshape(m, m), -bare[held].ravel()))
+
+
+def _check_definite(solver: MobilitySolver, mobility: Array, held: Indices) -> None:
+    """Refuse the held spheres' mobility (m, m) where its weakest motion drowns in what the solver errs by."""
+    size = np.sqrt(np.abs(np.diag(mobility)))
+    try:
+        np.linalg.cholesky((mobility + mobility.T) / np.outer(size, size))
+    except np.linalg.LinAlgError as error:
+        named = ", ".join(map(str, held.tolist()))
+        fault = f"the mobility of the held spheres {named} is singular to the digits it has: move them apart"
+        raise RefusedError(f"solver {solver.name!r}: {fault}") from error
 
 
 def velocities(
@@ -210,20 +188,12 @@ def velocities(
     InputError, RefusedError
         As for `mobility_matrix`.
     """
-    configuration = _configuration(centres, radii, wall)
-    setting = _setting(viscosity, shear_rate, wall)
+    configuration = configuration_of(centres, radii, wall)
+    setting = setting_of(viscosity, shear_rate, wall)
     n = len(configuration.radii)
-    chosen = _held(held, n)
+    chosen = held_of(held, n)
     check_needs(solver.traits, solver.name, configuration, setting, torques is not None or chosen.size > 0)
-    loads = np.zeros((n, 6))
-    for part, given, what in ((slice(0, 3), forces, "forces"), (slice(3, 6), torques, "torques")):
-        if given is not None:
-            numbers = _numbers(what, given)
-            if numbers.shape != (n, 3):
-                raise InputError(f"{what} must be ({n}, 3), not {numbers.shape}")
-            loads[:, part] = numbers
-    if not np.isfinite(loads).all():
-        raise InputError("forces and torques must be finite")
+    loads = loads_of(n, forces, torques)
     prepared = asking.prepare(solver, solver.plan(setting), configuration)
     radius = float(configuration.radii.max())
     pushed = float(np.abs(loads[:, :3]).max() + np.abs(loads[:, 3:]).max() / radius) / (6 * np.pi * viscosity * radius)

@@ -11,6 +11,7 @@ from mpad_core.physics.molecules import site_counts
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import BondList, State, no_bonds
 from mpad_core.running.clocks import drawn
+from mpad_core.running.crossing import refuse_overlaps
 from mpad_core.running.march import Machine, configuration_of, make_ready, march
 
 ZERO = 1 << 40  # the sub-step of time zero: the same with and without preparations, and so are the draws after it
@@ -19,9 +20,16 @@ Listener = Callable[[str, State], None]
 
 
 def at_rest(machine: Machine) -> State:
-    """Give the cells at their places, without bonds, moving as flow and weight alone would have them."""
+    """Give the cells at their places, without bonds, moving as flow and weight alone would have them.
+
+    Raises
+    ------
+    RefusedError
+        If smooth spheres overlap there, or the wall cuts one.
+    """
     problem = machine.problem
     cells = len(problem.names)
+    refuse_overlaps(problem, problem.start, problem.start[:, 2] - problem.radii)
     state = State(
         step=0,
         zero=0,
@@ -75,6 +83,7 @@ def initial_state(machine: Machine, listener: Listener = lambda name, state: Non
             rolled = rolled_on
             listener(problem.names[cell], rolled)
         state = _placed(problem, state, rolled, int(cell))
+    refuse_overlaps(problem, state.centres, state.wall_gaps)
     return evolve(state, step=ZERO, zero=ZERO)
 
 

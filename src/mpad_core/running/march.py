@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from attrs import evolve, frozen
 
-from mpad_core.arrays import Array
+from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.errors import RefusedError
 from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.tables import value
@@ -23,6 +23,7 @@ from mpad_core.physics.wall_density import Rasters, rasters
 from mpad_core.running import assembly, pace
 from mpad_core.running.burst import NO_BALANCE, NOT_POSITIVE, ROOM_NEEDED, burst
 from mpad_core.running.capturing import with_captures
+from mpad_core.running.crossing import apart, crossing, refusal
 from mpad_core.running.layout import Clocks, Course, Dice, Limits, Motion, Progress, Trail
 from mpad_core.running.moving import refresh_turns
 from mpad_core.running.reacting import TENSION, bond_length
@@ -75,9 +76,9 @@ def configuration_of(problem: Problem, state: State) -> Configuration:
     return Configuration(centres=state.centres, radii=problem.radii, wall_gaps=state.wall_gaps)
 
 
-def _ahead(problem: Problem, state: State, time: float) -> Configuration:
-    """Predict the configuration a time ahead; no gap to the wall closes by more than a tenth."""
-    shift = state.drift[:, :3] * time
+def _ahead(problem: Problem, state: State, pairs: Indices, time: float) -> Configuration:
+    """Predict the configuration a time ahead; no gap to the wall closes by more than a tenth, none of pairs by half."""
+    shift = apart(problem, pairs, state.centres, state.drift[:, :3] * time)
     if problem.setting.wall:
         shift[:, 2] = np.maximum(shift[:, 2], -0.1 * state.wall_gaps)
     return Configuration(centres=state.centres + shift, radii=problem.radii, wall_gaps=state.wall_gaps + shift[:, 2])
@@ -89,7 +90,7 @@ def march(machine: Machine, state: State, until: float) -> Iterator[State]:
     Raises
     ------
     RefusedError
-        If the solver or the balance of loads refuses, naming the cells.
+        If the solver or the balance of loads refuses, or if cells are driven through each other; naming the cells.
     """
     yield state
     while state.time < until - 0.5 * machine.pace.grain:
@@ -98,11 +99,31 @@ def march(machine: Machine, state: State, until: float) -> Iterator[State]:
 
 
 def step(machine: Machine, state: State, until: float) -> State:
-    """Take one outer step."""
+    """Take one outer step: a shorter one where smooth spheres would pass through each other or the wall.
+
+    Raises
+    ------
+    RefusedError
+        If they would in the shortest there is.
+    """
+    left = until - state.time
+    while True:
+        following = _outer_step(machine, state, left)
+        found = crossing(machine.problem, state, following)
+        if found is None:
+            return following
+        grains = following.step - state.step
+        if grains == 1:
+            raise refusal(machine.problem, found, state)
+        left = 0.5 * grains * machine.pace.grain
+
+
+def _outer_step(machine: Machine, state: State, left: float) -> State:
+    """Take one outer step of at most the time left (s), to within a grain."""
     problem = machine.problem
     moves = pace.pair_moves(problem, _coupled_pairs(machine, state), state.centres, machine.pace.share)
-    stride = pace.stride_of(problem, machine.pace, moves, state.drift, until - state.time)
-    middle = _ahead(problem, state, 0.5 * stride.sub_steps * stride.grains * machine.pace.grain)
+    stride = pace.stride_of(problem, machine.pace, moves, state.drift, left)
+    middle = _ahead(problem, state, moves.pairs, 0.5 * stride.sub_steps * stride.grains * machine.pace.grain)
     coupling = machine.coupler.at(middle, state.mean_loads, state.guess, Watch(state.level, state.trust))
     coupling = machine.drift.added(coupling, middle, state.step)
     bounds = pace.limits(problem, machine.pace, moves, state.centres, middle.wall_gaps, stride)
