@@ -12,9 +12,11 @@ import math
 import numpy as np
 
 from mpad_core.arrays import Array, Indices
+from mpad_core.interfaces.values import Configuration
 from mpad_core.numerics.compiled import compiled
 from mpad_core.numerics.harmonics.krylov import System, balance
 from mpad_core.numerics.harmonics.layout import place, places
+from mpad_core.numerics.neighbours import closest_pair
 
 SHARE = 0.045
 
@@ -70,3 +72,29 @@ def missed_afar(system: System, reach: float) -> float:
     count = len(system.at.degrees)
     every = count * (count - 1) // 2
     return 1.0 if len(system.pairs.rows) == every else 1 + FAR / (2 + reach) ** 2
+
+
+def feigned_by(configuration: Configuration, least: float, wall: bool) -> float:
+    """Estimate the relative error of giving closer surfaces the lubrication of the least gap (smaller radii).
+
+    What changes visibly is sliding, whose resistance grows as the logarithm of the gap ε: along a wall as
+    8/15 ln 1/ε + 0.96 (Goldman, Cox and Brenner, Chem. Eng. Sci. 22 (1967) 637), of a sphere past another as
+    1/6 ln 1/ε + 1 (Jeffrey and Onishi, J. Fluid Mech. 139 (1984) 261). Touching surfaces do not slide at all: 1.
+    """
+    errors = [0.0]
+    if wall:
+        errors.append(_slid(float((configuration.wall_gaps / configuration.radii).min()), least, 8 / 15, 0.96))
+    i, j, gap = closest_pair(configuration.centres, configuration.radii)
+    if i != j:
+        errors.append(_slid(gap / float(min(configuration.radii[i], configuration.radii[j])), least, 1 / 6, 1.0))
+    return max(errors)
+
+
+def _slid(gap: float, least: float, slope: float, rest: float) -> float:
+    """Give the share of the sliding speed at the least gap that the true gap would take away."""
+    if gap >= least:
+        return 0.0
+    if gap <= 0:
+        return 1.0
+    near, far = slope * math.log(1 / gap) + rest, slope * math.log(1 / least) + rest
+    return near / far - 1

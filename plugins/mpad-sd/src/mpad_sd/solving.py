@@ -14,7 +14,7 @@ from mpad_core.numerics.harmonics.levels import Flow, Level, Scene
 from mpad_core.numerics.harmonics.products import solved
 from mpad_core.numerics.harmonics.warm import kept, started
 from mpad_core.numerics.neighbours import closest_pair
-from mpad_sd.accuracy import error_of, missed_afar
+from mpad_sd.accuracy import error_of, feigned_by, missed_afar
 from mpad_sd.near import degrees_of
 from mpad_sd.refusing import refuse_bad, refuse_loads
 
@@ -45,7 +45,8 @@ class Plan:
         degrees = degrees_of(scene.centres, scene.radii, scene.gaps, scene.wall, self.reach)
         with refused("sd", lambda: closest(configuration)):
             level = level_of(scene, degrees)
-        return Prepared(plan=self, degrees=degrees, level=level, guess=guess)
+        feigned = feigned_by(configuration, self.least_gap, self.setting.wall)
+        return Prepared(plan=self, degrees=degrees, level=level, feigned=feigned, guess=guess)
 
     def _scene(self, configuration: Configuration) -> Scene:
         """Put what touches to the least gap from the wall; pairs are put so for lubrication alone."""
@@ -93,6 +94,7 @@ class Prepared:
     plan: Plan
     degrees: Degrees
     level: Level
+    feigned: float  # relative error that the least gap makes
     guess: Array | None = None
 
     def solve(self, loads: Array) -> Motion:
@@ -136,7 +138,7 @@ class Prepared:
         lonely = np.ones(len(system.at.degrees), np.int64)
         lonely[self.degrees.who] = 0
         each = (error_of(system, ambient, *column, lonely) for column in zip(loads, y, u, strict=True))
-        return max(each) * missed_afar(system, self.plan.reach)
+        return max(each) * missed_afar(system, self.plan.reach) + self.feigned
 
     def _symmetric(self, mobility: Array) -> Array:
         """Give the symmetric part, in the units of `layout`.
