@@ -29,7 +29,7 @@ class Outcome:
     iterations: int = -1  # of one right-hand side; of a run, its outer steps
     claimed: float = math.nan  # error that the solver reports
     found: float = math.nan  # error found, or for a run what must be small
-    seconds: float = math.nan
+    seconds: float = math.nan  # of the processor
 
 
 @frozen(kw_only=True)
@@ -45,7 +45,7 @@ class Case:
 
     def of(self, chosen: MobilitySolver) -> Outcome:
         """Ask; a refusal must be one clear line that says who or what is at fault."""
-        began = time.perf_counter()
+        began = time.process_time()
         try:
             found = self.ask(chosen)
         except MpadError as error:
@@ -57,7 +57,7 @@ class Case:
                 found = Outcome(verdict=FAILS, why=f"must not be refused: {line}")
             else:
                 found = Outcome(verdict=REFUSED, why=line)
-        return evolve(found, seconds=time.perf_counter() - began)
+        return evolve(found, seconds=time.process_time() - began)
 
 
 def judged(faults: list[str], **numbers: Any) -> Outcome:

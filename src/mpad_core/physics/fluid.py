@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from attrs import frozen
 
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import InputError, RefusedError
@@ -14,6 +15,34 @@ from mpad_core.physics.questions import check_needs
 
 ON_SURFACE = 1e-9
 """Radii: points this near to a sphere's surface are on it."""
+
+
+FADE = 0.1
+"""Radii over which what a solver leaves of slip at a surface, and is taken off, fades away from it."""
+
+
+@frozen(kw_only=True, eq=False)
+class _Surface:
+    """A sphere's surface as n points see it: what a solver does not resolve there, no-slip gives."""
+
+    nearest: Array  # (n, 3), its points nearest to them, just outside
+    distance: Array  # (n,)
+    fading: Array  # (n,), 1 on the surface
+    velocity: Array  # (n, 3), the surface's own there
+
+    @classmethod
+    def of(cls, sphere: tuple[Array, float], motion: Array, points: Array) -> "_Surface":
+        centre, radius = sphere
+        arm = points - centre
+        length = np.linalg.norm(arm, axis=1)
+        distance = np.maximum(length - radius * (1 + ON_SURFACE), 0.0)
+        foot = arm * (radius / length)[:, None]
+        return cls(
+            nearest=centre + (1 + ON_SURFACE) * foot,
+            distance=distance,
+            fading=np.exp(-distance / (FADE * radius)),
+            velocity=motion[:3] + np.cross(motion[3:], np.where((distance > 0)[:, None], foot, arm)),
+        )
 
 
 def fluid_velocities(
@@ -28,7 +57,7 @@ def fluid_velocities(
         As for `velocities`; the solver must be able to tell the fluid's velocity.
     points : (n, 3)
         Outside the spheres and not below the wall. On a sphere's surface, to a billionth of its radius, the fluid moves
-        as the surface does.
+        as the surface does; what the solver leaves of slip there is taken off, fading over a tenth of a radius.
 
     Returns
     -------
@@ -48,12 +77,17 @@ def fluid_velocities(
     at = _points(points, configuration, wall)
     prepared = asking.prepare(solver, solver.plan(setting), configuration)
     motion = asking.solve(solver, prepared, loads)
-    flow = asking.flow(solver, prepared, motion, at)
-    for centre, radius, own in zip(configuration.centres, configuration.radii, motion.velocity, strict=True):
-        arm = at - centre
-        on = np.linalg.norm(arm, axis=1) <= radius * (1 + ON_SURFACE)
-        flow[on] = own[:3] + np.cross(own[3:], arm[on])
-    return flow
+    spheres = zip(configuration.centres, configuration.radii, strict=True)
+    surfaces = [_Surface.of(*sphere, at) for sphere in zip(spheres, motion.velocity, strict=True)]
+    flow = asking.flow(solver, prepared, motion, np.concatenate([at, *(s.nearest for s in surfaces)]))
+    free, *slipping = np.split(flow, len(surfaces) + 1)
+    inverse = [1 / np.maximum(s.distance, 1e-300) for s in surfaces]
+    for surface, found, share in zip(surfaces, slipping, inverse, strict=True):
+        free -= (share / sum(inverse) * surface.fading)[:, None] * (found - surface.velocity)
+    for surface in surfaces:
+        on = surface.distance == 0
+        free[on] = surface.velocity[on]
+    return free
 
 
 def _points(points: Any, configuration: Configuration, wall: bool) -> Array:

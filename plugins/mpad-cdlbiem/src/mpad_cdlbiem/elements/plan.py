@@ -10,6 +10,7 @@ from mpad_cdlbiem.elements.friction import Friction
 from mpad_cdlbiem.elements.iteration import ITERATIONS
 from mpad_cdlbiem.elements.memory import refuse_many
 from mpad_cdlbiem.elements.mesh import mesh_of
+from mpad_cdlbiem.elements.resolved import refuse_unresolved
 from mpad_cdlbiem.elements.solution import Iterating, Solution, solution
 from mpad_cdlbiem.refusing import refuse_bad, refuse_loads
 from mpad_core.arrays import Array
@@ -66,10 +67,12 @@ class ElementsPlan:
         Raises
         ------
         RefusedError
-            For numbers that are not finite, spheres that touch, more than fit in memory, an iteration that fails.
+            For numbers that are not finite, spheres that touch, more than fit in memory, some too small for the
+            elements beside them, an iteration that fails.
         """
         refuse_bad(configuration, self.setting)
         refuse_many(len(configuration.radii), self.elements)
+        refuse_unresolved(configuration, self.elements, self.setting.wall)
         side = math.isqrt(self.elements // 6)
         iterating = Iterating(name=self.iteration, tolerance=self.tolerance, guess=guess)
         fine = self._fine(configuration, iterating)
