@@ -1,8 +1,8 @@
 """Every hard case with every solver: what holds, what is refused, and the numbers. Writes ``docs/hard-cases.md``.
 
-Run as ``python benchmarks/hard_cases.py [--docs PAGE] [--kept FILE] [--columns NAME,NAME]``: a quarter of an hour of one
-processor. The cases are those of ``validation/hard``, which the tests ask too. With ``--kept`` outcomes are kept in a
-JSON file, and only what is not in it is asked.
+Run as ``python benchmarks/hard_cases.py [--docs PAGE] [--kept FILE] [--columns NAME,NAME]``: a quarter of an hour of
+one processor. The cases are those of ``validation/hard``, which the tests ask too. With ``--kept`` outcomes are kept in
+a JSON file, and only what is not in it is asked.
 """
 
 import argparse
@@ -25,10 +25,10 @@ def outcomes(families: dict[str, list[Case]], columns: list[str], kept: Path | N
     """Ask what has not been asked."""
     known: dict[str, Any] = json.loads(kept.read_text()) if kept and kept.exists() else {}
     chosen = solvers()
-    for case in (case for cases in families.values() for case in cases):
+    for family, case in ((family, case) for family, cases in families.items() for case in cases):
         row = known.setdefault(case.name, {})
         for name in columns:
-            if name not in row:
+            if name not in row and name in page.columns_of(family):
                 row[name] = attrs.asdict(case.of(chosen[name]))
                 print(f"{case.name} | {name} | {row[name]['verdict']} {row[name]['why'][:90]}", flush=True)
                 if kept:

@@ -18,7 +18,7 @@ FEW = 50  # spheres up to which the whole matrix is asked for
 SYMMETRIC = 1e-7  # of Stokes' mobilities; what is iterated leaves an asymmetry
 SHORTFALL = 3.0  # an estimate of the error is one to within this factor
 FINEST = 3e-4  # error of the finest solver near contact, see docs/accuracy.md
-LANCZOS = 40  # steps
+LANCZOS = 25  # steps
 
 
 @cache

@@ -81,11 +81,10 @@ def apart(problem: Problem, pairs: Indices, centres: Array, shift: Array) -> Arr
     if len(pairs) == 0:
         return shift
     gaps = np.maximum(pair_gaps(problem, pairs, centres), 0.0)
-    closed = gaps - pair_gaps(problem, pairs, centres + shift)
-    if (closed <= _HALF * gaps).all():
+    if (gaps - pair_gaps(problem, pairs, centres + shift) <= _HALF * gaps).all():
         return shift
-    # a distance is a convex function of the displacement, so a share of this closes at most that share of the gap
-    shorter: Array = shift * float((_HALF * gaps / np.maximum(closed, 1e-300)).min())
+    length = np.linalg.norm(shift[pairs[:, 0]] - shift[pairs[:, 1]], axis=1)  # closes no gap by more than itself
+    shorter: Array = shift * min(float((_HALF * gaps / np.maximum(length, 1e-300)).min()), 1.0)
     return shorter
 
 
