@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mpad_core import InputError, mobility_matrix, solver, velocities
+from mpad_core import InputError, RefusedError, mobility_matrix, solver, velocities
 
 CENTRES = np.array([[0, 0, 1.2], [2.4, 0.3, 1.5], [-0.5, 2.6, 3.0]])
 RADII = np.array([1.0, 0.8, 1.1])
@@ -165,3 +165,20 @@ def test_what_a_solver_cannot_treat_is_refused_before_any_solve(lacking: Any, ne
 def test_a_solver_without_torques_is_not_asked_for_them() -> None:
     with pytest.raises(InputError, match=r"limited.*torque"):
         velocities(Limited(torques=False), CENTRES, RADII, viscosity=1.0, torques=TORQUES)
+
+
+def test_held_spheres_in_one_place_are_refused_by_name() -> None:
+    """Their mobility is singular, and what a solve would give for the loads that hold them means nothing."""
+    bare = solver("rpb", lone_sphere="blake")
+    with pytest.raises(RefusedError, match=r"solver 'rpb': the mobility of the held spheres 0, 1 is singular"):
+        velocities(bare, [[0, 0, 1.5], [0, 0, 1.5], [2.5, 0, 1.5]], 1.0, viscosity=1.0, shear_rate=1.0, held=[0, 1])
+
+
+def test_held_spheres_of_any_size_are_not_refused() -> None:
+    """The check is in units in which the mobility is symmetric, whatever the radius."""
+    speeds = []
+    for radius in (1e-2, 1.0, 5.0, 300.0):
+        at = radius * np.array([[0, 0, 1.001], [2.001, 0, 1.001], [1, 2.2, 1.3]])
+        moved = velocities(solver("rpb"), at, radius, viscosity=1.0, shear_rate=1.0, held=[0, 1])
+        speeds.append(moved[2, 0] / radius)
+    assert speeds == pytest.approx([speeds[0]] * 4, rel=1e-9)

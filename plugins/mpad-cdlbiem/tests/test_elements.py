@@ -347,3 +347,10 @@ def test_refuses_more_spheres_than_fit():
     refuse_many(40, 96)
     with pytest.raises(RefusedError, match=r"100 spheres of 96 elements need 19.9 GB; 44 spheres would do"):
         refuse_many(100, 96)
+
+
+def test_refuses_a_sphere_that_elements_beside_it_do_not_resolve():
+    corner = {"centres": [[0, 0, 1.01], [0.25, 0, 0.011]], "radii": [1.0, 0.01]}
+    with pytest.raises(RefusedError, match=r"sphere 1 of radius 0\.01 µm is too small beside elements of 0\.362 µm on"):
+        prepared(**corner)
+    prepared([[0, 0, 1.01], [5.0, 0, 0.011]], [1.0, 0.01])  # far from it

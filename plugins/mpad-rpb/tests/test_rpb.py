@@ -240,3 +240,14 @@ def test_inverts() -> None:
     assert (inverse == inverse.T).all()
     assert inverse @ matrix == pytest.approx(np.eye(30), abs=1e-6)
     assert not invert(np.diag([1.0, -1.0]))
+
+
+@pytest.mark.parametrize("gap", [1e-9, 1e-6, 1e-3, 0.3])
+def test_the_error_of_a_bare_sphere_at_the_wall_is_told(gap):
+    """Relative to the exact velocity, so that one which is too fast does not make its own error look small."""
+    at, load = Configuration(centres=[[0, 0, 1 + gap]], radii=[1.0], wall_gaps=[gap]), np.zeros((1, 6))
+    load[0, 2] = -6 * np.pi
+    setting = Setting(viscosity=1.0, shear_rate=1.0)
+    bare, exact = (s.solve(s.prepare(s.plan(setting), at), load) for s in (BLAKE, EXACT))
+    wrong = np.linalg.norm(bare.velocity - exact.velocity) / np.linalg.norm(exact.velocity)
+    assert bare.report.error == pytest.approx(wrong, rel=1e-6)

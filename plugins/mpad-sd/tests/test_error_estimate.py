@@ -78,3 +78,19 @@ def test_reported_error_covers_the_true_one(kind, reach, count):
     found = ratios(kind, solver("sd", reach=reach), range(count))
     assert (found >= 1).mean() >= (0.97 if count > 100 else 0.9)  # of thirty, three by chance
     assert 1 < np.median(found) < 10
+
+
+@pytest.mark.parametrize("gap", [1e-7, 1e-9, 1e-12])
+def test_what_the_least_gap_feigns_is_told(gap):
+    """Below it spheres slide as at the least gap; exactly they would be slower by the logarithm."""
+    setting, at = Setting(viscosity=1.0, shear_rate=1.0), {"centres": [[0, 0, 1 + gap]], "radii": [1.0]}
+    answers = []
+    for name in ("sd", "isolated"):
+        chosen = solver(name)
+        there = Configuration(**at, wall_gaps=[gap])
+        answers.append(chosen.solve(chosen.prepare(chosen.plan(setting), there), np.zeros((1, 6))))
+    wrong = velocity_error(answers[0].velocity, answers[1].velocity, np.ones(1))
+    assert wrong < 3 * answers[0].report.error < 9 * wrong
+    touching = Configuration(centres=[[0, 0, 1]], radii=[1.0])
+    sd = solver("sd")
+    assert sd.solve(sd.prepare(sd.plan(setting), touching), np.zeros((1, 6))).report.error >= 1
