@@ -13,7 +13,8 @@ from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration
 
 CLUSTER = "finite, symmetric, definite; error of free motion in shear and under weight within the claim; or refused"
-ELEMENTS = ("elements 24", "elements 96", "cdl-biem 1e-3")
+DEAR = ("elements 24", "elements 96", "cdl-biem 1e-3")
+UNEQUAL: dict[str, Any] = {"dear": (*DEAR, "sd")}
 
 Geometry = Callable[[], tuple[Any, Any]]
 
@@ -24,7 +25,7 @@ def _asked(geometry: Geometry, wall: bool, chosen: MobilitySolver) -> Any:
 
 
 def _case(name: str, geometry: Geometry, wall: bool = True, **more: Any) -> Case:
-    return Case(name=name, must=CLUSTER, ask=partial(_asked, geometry, wall), **({"dear": ELEMENTS} | more))
+    return Case(name=name, must=CLUSTER, ask=partial(_asked, geometry, wall), **({"dear": DEAR} | more))
 
 
 def lone(gap: float) -> tuple[Any, Any]:
@@ -56,6 +57,11 @@ def corner(gap: float) -> tuple[Any, Any]:
     return [[0, 0, 1 + small * gap], [np.sqrt(reach**2 - drop**2), 0, small * (1 + gap)]], [1.0, small]
 
 
+def unequal() -> tuple[Any, Any]:
+    """Two in unbounded fluid, one a hundredth of the other, their gap 1e-6 of the small."""
+    return [[0, 0, 0], [1.01 + 1e-8, 0, 0]], [1.0, 0.01]
+
+
 def crossed(depth: float) -> tuple[Any, Any]:
     """Two thrown into each other."""
     return [[0, 0, 2], [2 - depth, 0, 2]], [1.0, 1.0]
@@ -83,8 +89,16 @@ CONTACT = [
     *(_case(f"three at the wall, all gaps {_gap(g)}", partial(triple, g, 1.0)) for g in (1e-6, 1e-9, 0.0)),
     *(_case(f"three without a wall, gaps {_gap(g)}", partial(free_triple, g), False) for g in (1e-6, 0.0)),
     *(_case(f"squeezed by two cells and wall, gaps {_gap(g)}", partial(squeezed, g)) for g in (1e-3, 1e-6)),
-    *(_case(f"radii 100:1 at the wall, gaps {_gap(g)} of the small", partial(corner, g)) for g in (0.1, 1e-6)),
-    _case("radii 100:1 without a wall, gap 1e-06 a", lambda: ([[0, 0, 0], [1.01 + 1e-8, 0, 0]], [1.0, 0.01]), False),
+    *(
+        _case(f"radii 100:1 at the wall, gaps {_gap(g)} of the small", partial(corner, g), **UNEQUAL)
+        for g in (0.1, 1e-6)
+    ),
+    _case(
+        "radii 100:1 without a wall, gap 1e-06 a",
+        lambda: ([[0, 0, 0], [1.01 + 1e-8, 0, 0]], [1.0, 0.01]),
+        False,
+        **UNEQUAL,
+    ),
 ]
 BEYOND = [
     _case("two overlapping by 0.1 a", partial(crossed, 0.1)),

@@ -10,6 +10,7 @@ from hard.cases import Case, Outcome, judged
 from hard.laboratory import Seen, problem_of, ready, run, started
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.physics.coupling import lone_velocity
+from mpad_core.physics.state import State
 
 GROWTH = 1e-9  # of the largest energy: rounding, and the tables' 1e-6 of small changes
 APART = "spheres never overlap; or stopped by name"
@@ -85,7 +86,12 @@ def let_go(chosen: MobilitySolver) -> Outcome:
     problem, seen = _bound(chosen)
     still = evolve(problem, setting=evolve(problem.setting, shear_rate=0.0))
     machine = _watched(_with_bonds(still, INERT, chosen))
-    return _steady(run(machine, seen.last.time + 0.02, seen.last))
+    return _steady(run(machine, 0.02, _anew(seen.last)))
+
+
+def _anew(state: State) -> State:
+    """Give a state for another machine, whose steps are counted in another unit: its clock shows zero."""
+    return evolve(state, step=0, zero=0, time=0.0)
 
 
 def _with_bonds(problem: Any, bond: dict[str, float], chosen: MobilitySolver) -> Any:
@@ -99,7 +105,7 @@ def all_break(chosen: MobilitySolver) -> Outcome:
     number = len(seen.last.bonds)
     still = evolve(problem, setting=evolve(problem.setting, shear_rate=0.0))
     machine = ready(_with_bonds(still, BRITTLE, chosen))
-    after = run(machine, seen.last.time + 2e-3, seen.last)
+    after = run(machine, 2e-3, _anew(seen.last))
     faults = [] if after.broken == number and len(after.last.bonds) == 0 else [f"{after.broken} of {number} broke"]
     return _seen(after, faults, float(len(after.last.bonds)))
 
@@ -157,7 +163,7 @@ RUNS = [
     Case(name="bonds of 100 pN/nm by the hundred", must="finite, off the wall, at least 100 bonds", ask=many_bonds),
     Case(name="flow taken away from them", must=STEADY, ask=let_go),
     Case(name="all of them breaking at once", must="none left, finite", ask=all_break),
-    Case(name="shear 10 000 1/s", must=APART, ask=fast, dear=LUBRICATED),
+    Case(name="shear 10 000 1/s", must=APART, ask=fast, dear=("sd", *LUBRICATED)),
     Case(name="no shear: two settle", must=STEADY, ask=settling, dear=LUBRICATED),
     Case(name="10 000 000 sub-steps of one cell", must="nothing drifts; x by the exact speed to 1e-6", ask=very_many,
          dear=("isolated", "rpb", "rpb blake", "sd", "cdl-biem 1e-2", *LUBRICATED)),
