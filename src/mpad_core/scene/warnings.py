@@ -47,8 +47,8 @@ def _coupling_off(of: Estimates) -> str | None:
     if of.nearest is None or of.nearest.felt <= FELT:
         return None
     return (
-        f"off, but {_pair(of)} come within {of.nearest.gap:.3g} um of each other on straight ways and change each "
-        f"other's velocity by a share of about {of.nearest.felt:.1g}, more than {FELT:g}; "
+        f"off, but on straight ways {_pair(of)} {_meet(of.nearest.gap)} and change each other's velocity by a share of "
+        f"about {of.nearest.felt:.1g}, more than {FELT:g}; "
         'write solver = "sd", and leave effects.coupling out'
     )
 
@@ -60,8 +60,8 @@ def _lubrication_off(of: Estimates) -> str | None:
     if of.nearest.gap >= limit:
         return None
     return (
-        f"off, but {_pair(of)} come within {of.nearest.gap:.3g} um of each other on straight ways, less than half a "
-        f'radius, {limit:.3g} um; write solver = "sd" or "cdl-biem"'
+        f"off, but on straight ways {_pair(of)} {_meet(of.nearest.gap)}, nearer than half a radius, {limit:.3g} um; "
+        'write solver = "sd" or "cdl-biem"'
     )
 
 
@@ -204,6 +204,10 @@ def warnings_of(scene: Scene, problem: Problem) -> Iterator[Doubt]:
                 text = rule(of)
             if text:
                 yield Doubt(effect=name, text=text)
+
+
+def _meet(gap: float) -> str:
+    return f"come within {gap:.3g} um of each other" if gap > 0 else "touch"
 
 
 def _pair(of: Estimates) -> str:
