@@ -9,12 +9,12 @@ import numpy as np
 from attrs import field, frozen, validators
 
 from mpad_core.arrays import Array
-from mpad_core.interfaces.errors import RefusedError
+from mpad_core.interfaces.errors import InputError, MpadError, RefusedError
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import AccuracyLevel, Configuration, Motion, Rung, Setting, SolverTraits
 from mpad_core.physics import asking
 from mpad_core.physics.levels import Level, installed_levels, level_named, relative_error
-from mpad_core.physics.questions import unit_load
+from mpad_core.physics.questions import check_needs, unit_load
 from mpad_core.plugins.hookspecs import hookimpl
 
 _WORTH_TRYING = 1.6  # times less than the rung before is what the next one claims; those as near may err alike
@@ -57,7 +57,7 @@ class Auto:
 
     @trust.validator
     def _one_for_each_level(self, attribute: object, value: tuple[float, ...]) -> None:
-        if value and (len(value) != len(self.levels) or min(value) <= 0):
+        if value and (len(value) != len(self.levels) or not all(0 < trust < np.inf for trust in value)):
             raise ValueError(
                 f"trust must be one positive number for each of the {len(self.levels)} levels, not {value}"
             )
@@ -114,6 +114,8 @@ def _worth_trying(accuracy: float) -> list[Level]:
     """
     found: list[Level] = []
     for level in installed_levels():
+        if not np.isfinite(level.claim):
+            continue
         if level.reference and found and found[-1].claim <= accuracy:
             continue
         if not found or level.claim * _WORTH_TRYING <= found[-1].claim:
@@ -140,12 +142,14 @@ class _Plan:
 
     def prepared(self, at: Configuration) -> _Prepared:
         loads, found = _tried_loads(self.setting, at), None
+        refusal: MpadError = InputError("solver 'auto': no solver that states levels is installed")
         before: list[tuple[float, Array]] = []
         for rung in self.rungs:
             try:
+                check_needs(rung.solver.traits, rung.solver.name, at, self.setting)
                 inner = asking.prepare(rung.solver, self._plan_of(rung), at)
                 motion = asking.solve(rung.solver, inner, loads)
-            except RefusedError as refused:
+            except (InputError, RefusedError) as refused:
                 refusal = refused
                 continue
             found = _Prepared(solver=rung.solver, inner=inner)

@@ -23,6 +23,7 @@ from mpad_core.physics.levels import relative_error
 from mpad_core.physics.problem import Problem
 
 _PATIENCE = 1.5  # by which an estimate that proved too large must grow before it is doubted again
+_LEAST = 1e-300  # trust in an error that is reported as infinite
 
 
 @frozen(kw_only=True, eq=False)
@@ -49,10 +50,10 @@ class LadderCoupling:
         """Ask the rung of before, and climb if need be; another rung's guess is of no use."""
         level, trust = watch.level, watch.trust or self.trusts[watch.level]
         found = self._asked(level, configuration, mean_loads, guess)
-        while level < len(self.rungs) - 1 and (found is None or trust * _reported(found) > self.accuracy):
+        while level < len(self.rungs) - 1 and not self._will_do(found, trust):
             higher = self._asked(level + 1, configuration, mean_loads, None)
             if found is not None and higher is not None and self._agree(found, higher):
-                trust = self.accuracy / (_PATIENCE * _reported(found))
+                trust = max(self.accuracy / (_PATIENCE * _reported(found)), _LEAST)
                 break
             level, found, trust = level + 1, higher, self.trusts[level + 1]
         assert found is not None  # the last rung raises if it refuses
@@ -68,6 +69,10 @@ class LadderCoupling:
             if level == len(self.rungs) - 1:
                 raise
         return None
+
+    def _will_do(self, found: Coupling | None, trust: float) -> bool:
+        """Tell whether there is an answer, and its error seems small enough; where no cell is free, there is none."""
+        return found is not None and (found.felt is None or trust * _reported(found) <= self.accuracy)
 
     def _agree(self, found: Coupling, higher: Coupling) -> bool:
         assert found.felt is not None

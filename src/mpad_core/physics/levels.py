@@ -7,7 +7,7 @@ import numpy as np
 from attrs import evolve, frozen
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.interfaces.errors import InputError
+from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.interfaces.mobility import Laddered, MobilitySolver
 from mpad_core.interfaces.values import AccuracyLevel, Configuration, Motion, Setting
 from mpad_core.physics import asking
@@ -35,7 +35,7 @@ def installed_levels(names: Sequence[str] | None = None) -> tuple[Level, ...]:
     """Give every level of the installed solvers (or of those named), the coarsest claim first.
 
     A solver that states no level counts once, with its defaults and without a claim (infinity). Solvers that stand for
-    others (`Laddered`) are left out.
+    others (`Laddered`) are left out, and, unless named, those that fail to load: `mpad parts` tells of them.
 
     Raises
     ------
@@ -44,11 +44,19 @@ def installed_levels(names: Sequence[str] | None = None) -> tuple[Level, ...]:
     """
     found = []
     for name in [part.name for part in registry.installed("solver")] if names is None else names:
-        made = registry.load("solver", name)
-        if not isinstance(made(), Laddered):
-            levels = made.traits.levels or (AccuracyLevel(parameters=(), error=np.inf),)
-            found += [_level(name, made, level) for level in levels]
+        try:
+            found += _levels_of(name)
+        except (PartError, TypeError, ValueError) as error:
+            if names is not None:
+                raise error if isinstance(error, PartError) else PartError(f"solver {name!r}: {error}") from error
     return tuple(sorted(found, key=lambda level: -level.claim))
+
+
+def _levels_of(name: str) -> list[Level]:
+    made = registry.load("solver", name)
+    if isinstance(made(), Laddered):
+        return []
+    return [_level(name, made, level) for level in made.traits.levels or (AccuracyLevel(parameters=(), error=np.inf),)]
 
 
 def _level(name: str, made: type[MobilitySolver], level: AccuracyLevel) -> Level:

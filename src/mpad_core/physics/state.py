@@ -163,7 +163,8 @@ def from_arrays(arrays: Mapping[str, Any], cells: int, sites: int) -> State:
         If the arrays are not a state of so many cells with so many sites in all.
     """
     own = {name.removeprefix("state."): value for name, value in arrays.items() if name.startswith("state.")}
-    whole = {name: own.pop(name).item() for name in ("step", "zero", "time", "level", "trust")}
+    whole = {name: own.pop(name).item() for name in ("step", "zero", "time")}
+    whole |= {name: own.pop(name).item() for name in ("level", "trust") if name in own}  # older states have neither
     bonds = BondList(**{n.removeprefix("bonds."): v for n, v in arrays.items() if n.startswith("bonds.")})
     state = State(**whole, **own, bonds=bonds, guess=arrays.get("guess"))
     _check(state, cells, sites)

@@ -15,6 +15,7 @@ from attrs import define, evolve, field, frozen
 from mpad_core.arrays import Array
 from mpad_core.interfaces.errors import MpadError
 from mpad_core.interfaces.values import Configuration
+from mpad_core.physics.asking import one_line
 from mpad_core.physics.couplers import Drift, coupler
 from mpad_core.physics.coupling import NOT_WATCHED, Coupler, Coupling, Watch
 from mpad_core.physics.problem import Problem
@@ -27,6 +28,7 @@ from mpad_core.running.shares import Shares, shares
 EVERY, MOST = 128, 60  # outer steps between two that are looked at, to begin with; of these
 RARER = 4  # of those looked at, how many go by until one is solved again without lubrication
 TIMED_SHARE = 0.005  # of the run's time that timing bursts may take
+BARE_SHARE = 0.005  # and solves without lubrication
 
 
 @define(eq=False)
@@ -86,6 +88,7 @@ class Account:
     time: dict[str, float]  # coupling, heat's drift, burst, recording: parts of one; what the account itself took
     steps: int  # outer steps heard
     looked_at: int
+    fault: str = ""  # why it stopped looking
 
 
 @define(eq=False)
@@ -102,6 +105,8 @@ class Accounts:
     seconds: dict[str, float] = field(factory=lambda: dict.fromkeys(("coupling", "drift", "burst", "recording"), 0.0))
     spent: float = 0.0  # s, by the account itself
     unlubricated: Coupler | None = None
+    fault: str = ""  # why it stopped looking
+    spent_bare: float = 0.0  # s, by solves without lubrication
 
     @classmethod
     def of(cls, machine: Machine) -> "Accounts":
@@ -119,8 +124,11 @@ class Accounts:
         if self.steps > 0:  # the first one compiles
             for name, seconds in parts.items():
                 self.seconds[name] += seconds
-        if self.steps % self.every == 0:
-            self._look(before, after)
+        if self.steps % self.every == 0 and not self.fault:
+            try:
+                self._look(before, after)
+            except Exception as error:  # an account is no reason to end a run
+                self.fault = one_line(error)
         self.steps += 1
         self.spent += time.perf_counter() - began
 
@@ -141,8 +149,11 @@ class Accounts:
     def _without_lubrication(self, configuration: Configuration, state: State) -> Coupling | None:
         """Give the coupling by the same solver without lubrication, where it can leave it out; every few times."""
         problem = self.machine.problem
-        if not _can_leave_out(problem) or len(self.samples) % RARER:
+        expected = self.spent_bare + self.seconds["coupling"] / max(self.steps, 1)
+        dear = expected > BARE_SHARE * sum(self.seconds.values())
+        if dear or not _can_leave_out(problem) or len(self.samples) % RARER:
             return None
+        began = time.perf_counter()
         try:
             if self.unlubricated is None:
                 bare: Any = attrs.evolve(cast(Any, problem.solver), lubrication=False)
@@ -150,6 +161,8 @@ class Accounts:
             return self.unlubricated.at(configuration, state.mean_loads, None)
         except MpadError:  # bare, it may have no positive mobility
             return None
+        finally:
+            self.spent_bare += time.perf_counter() - began
 
     def closed(self) -> Account:
         """Give what came out."""
@@ -161,7 +174,7 @@ class Accounts:
             for effect in self.machine.problem.effects
         }
         spent["accounting"] = self.spent / whole if whole > 0 else 0.0
-        return Account(effects=effects, time=spent, steps=self.steps, looked_at=len(self.samples))
+        return Account(effects=effects, time=spent, steps=self.steps, looked_at=len(self.samples), fault=self.fault)
 
     def _timed(self, spent: dict[str, float]) -> dict[str, float | None]:
         """Give the shares of the time that can be told."""

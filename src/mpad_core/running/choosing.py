@@ -13,8 +13,9 @@ import numpy as np
 from attrs import evolve, frozen
 
 from mpad_core.arrays import Array, Indices
-from mpad_core.interfaces.errors import InputError, RefusedError
+from mpad_core.interfaces.errors import InputError, PartError, RefusedError
 from mpad_core.interfaces.values import Configuration
+from mpad_core.physics import asking
 from mpad_core.physics.auto import Auto
 from mpad_core.physics.couplers import coupler
 from mpad_core.physics.coupling import typical_speed
@@ -100,16 +101,37 @@ def chosen(problem: Problem, accuracy: float, until: float) -> Choice:
     InputError
         If no installed solver can treat the problem.
     """
-    levels = [level for level in installed_levels() if _treats(level, problem)]
+    levels = [level for level in installed_levels() if np.isfinite(level.claim) and _treats(level, problem)]
     if not levels:
-        raise InputError("solver 'auto': no installed solver can treat this scene; see `mpad parts`")
+        raise InputError("solver 'auto': no installed solver that states levels can treat this scene; see `mpad parts`")
+    if not problem.coupled:
+        return Choice(levels=(levels[0].label,), trust=(1.0,), reason="cells are not coupled: no solver is asked")
     places = _scouted(problem, levels, until)
-    near = _near(places[0])
+    near = _near(min(places, key=lambda place: place.closest()[0]))
     problem, places = problem.only(near), [place.part(near) for place in places]
-    fine = [k for k, level in enumerate(levels) if _MARGIN * level.claim <= accuracy]
-    reference = levels[fine[0] if fine else -1]
-    trials = tried(problem, levels[: levels.index(reference)], reference, places)
+    reference, expected = _expected(problem, levels, accuracy, places)
+    trials = tried(problem, levels[: levels.index(reference)], expected, places)
     return _choice(trials, levels[levels.index(reference) :], accuracy, len(places))
+
+
+def _expected(
+    problem: Problem, levels: Sequence[Level], accuracy: float, places: Sequence[Situation]
+) -> tuple[Level, list[Array]]:
+    """Give the level to compare with, and what it says: the coarsest that is fine enough, and does not refuse.
+
+    Raises
+    ------
+    RefusedError
+        If every level refuses somewhere, with what the last one says.
+    """
+    fine = [level for level in levels if _MARGIN * level.claim <= accuracy]
+    coarse = levels[: len(levels) - len(fine)]
+    for reference in (*fine, *reversed(coarse)):
+        try:
+            return reference, [moved for moved, _ in _moves(problem, reference, places)]
+        except (RefusedError, PartError) as error:
+            refusal = error
+    raise refusal
 
 
 def _treats(level: Level, problem: Problem) -> bool:
@@ -126,7 +148,7 @@ def _scouted(problem: Problem, levels: Sequence[Level], until: float) -> list[Si
         try:
             machine = make_ready(evolve(problem, solver=level.solver, thermal_energy=0.0))
             return situations(machine, until, _SITUATIONS, _MOST_STEPS)
-        except RefusedError:
+        except (RefusedError, PartError):
             continue
     return [_start(problem)]
 
@@ -143,15 +165,16 @@ def _near(place: Situation) -> Indices:
     return np.sort(np.argsort(distance, kind="stable")[:_MOST_CELLS])
 
 
-def tried(problem: Problem, levels: Sequence[Level], reference: Level, places: Sequence[Situation]) -> list[Trial]:
-    """Compare levels with a reference in some situations; those that refuse anywhere are left out."""
-    expected = [moved[0] for moved in _moves(problem, reference, places)]
+def tried(
+    problem: Problem, levels: Sequence[Level], expected: Sequence[Array], places: Sequence[Situation]
+) -> list[Trial]:
+    """Compare levels with what is expected in some situations; those that refuse or fail anywhere are left out."""
     trials = []
     for level in levels:
         try:
             found = _moves(problem, level, places)
             seconds = _seconds(problem, level, places[len(places) // 2])
-        except RefusedError:
+        except (RefusedError, PartError):
             continue
         errors = np.array([
             relative_error(u, v, place.configuration.radii)
@@ -159,12 +182,16 @@ def tried(problem: Problem, levels: Sequence[Level], reference: Level, places: S
         ])  # fmt: skip
         ratios = (errors + _ROUNDING) / (np.array([reported for _, reported in found]) + _ROUNDING)
         trust = float(max(ratios.max(), _LEAST_TRUST))
+        if not np.isfinite(trust):
+            continue
         trials.append(Trial(level=level, error=float(errors.max()), trust=trust, seconds=seconds))
     return trials
 
 
 def _moves(problem: Problem, level: Level, places: Sequence[Situation]) -> list[tuple[Array, float]]:
-    plan, speed = level.solver.plan(problem.setting), typical_speed(problem)
+    with asking.blamed(f"solver {level.name!r}"):
+        plan = level.solver.plan(problem.setting)
+    speed = typical_speed(problem)
     found = [answer(level.solver, plan, problem.setting, place, speed) for place in places]
     return [(motion.velocity, motion.report.error) for motion in found]
 

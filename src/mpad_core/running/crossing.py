@@ -67,6 +67,8 @@ def refusal(problem: Problem, found: Crossing, state: State) -> RefusedError:
         remedy = "shorten accuracy.explicit" if problem.tolerances.euler > 0 else "add [repulsion]"
     elif problem.contact is not None:
         remedy = "their [repulsion] is too weak"
+    elif not problem.coupled:
+        remedy = "add [repulsion], or let the fluid couple them (effects.coupling)"
     elif problem.solver.traits.lubrication:
         remedy = "add [repulsion]"
     else:

@@ -85,7 +85,10 @@ def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Pr
         listeners = _Listeners(recorder=recorder, accounts=Accounts.of(machine), signals=signals, bar=bar)
         with _closed(recorder):
             state, ended = _go_on(order, listeners, state, ended)
-    return Outcome(state=state, ended=ended, sub_step=machine.pace.sub_step, account=listeners.accounts.closed())
+    account = listeners.accounts.closed()
+    if account.fault:
+        log.write("shares of effects not told", why=account.fault)
+    return Outcome(state=state, ended=ended, sub_step=machine.pace.sub_step, account=account)
 
 
 @contextmanager

@@ -38,8 +38,15 @@ def situations(machine: Machine, until: float, number: int, most_steps: int | No
     list
         In the order of time, the start first. Fewer than asked for where there were fewer outer steps. A march that is
         refused ends where it was.
+
+    Raises
+    ------
+    RefusedError
+        If the very start is refused.
     """
     seen = [situation_of(machine.problem, state) for state in islice(_as_far_as_it_goes(machine, until), most_steps)]
+    if not seen:
+        raise RefusedError(f"solver {machine.problem.solver.name!r} refuses where the run begins")
     chosen = set(np.linspace(0, len(seen) - 1, number - 1).round().astype(int).tolist())
     return [seen[k] for k in sorted(chosen | {int(np.argmin([one.closest()[0] for one in seen]))})]
 

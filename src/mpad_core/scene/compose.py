@@ -9,9 +9,11 @@ from attrs import evolve
 from mpad_core.arrays import Array, Indices
 from mpad_core.interfaces.bonds import BondModel, Encounter
 from mpad_core.interfaces.errors import InputError
+from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.surface import Surface
 from mpad_core.interfaces.values import Configuration, Setting
 from mpad_core.physics.asking import blamed
+from mpad_core.physics.auto import Auto
 from mpad_core.physics.bare import Bare
 from mpad_core.physics.layouts.layout import Layout
 from mpad_core.physics.layouts.uniform import Uniform
@@ -53,7 +55,8 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         wall=effects["wall"].on,
     )  # fmt: skip
     if effects["coupling"].on:
-        check_needs(solver.traits, solver.name, Configuration(centres=start, radii=radii), setting)
+        for one in _stands_for(solver):
+            check_needs(one.traits, one.name, Configuration(centres=start, radii=radii), setting)
     species = _species(scene) if scene.bonds and scene.effects.bonds != "off" else ()
     sites = _site_densities(scene, cells)
     binds = np.array([cell.binds and effects["bonds"].on for cell in cells.values()])
@@ -88,6 +91,12 @@ def compose(scene: Scene, replicate: int = 0) -> Problem:
         site_kinds=_site_names(scene),
         layouts=_layouts(scene, cells),
     )
+
+
+def _stands_for(solver: MobilitySolver) -> tuple[MobilitySolver, ...]:
+    """Give a solver, and those that it has been told to choose from."""
+    told = solver.rungs() if isinstance(solver, Auto) and solver.levels else ()
+    return (solver, *(rung.solver for rung in told))
 
 
 def _partners(scene: Scene, names: list[str]) -> Indices:

@@ -67,7 +67,8 @@ def _lubrication_off(of: Estimates) -> str | None:
 
 def _thermal_off(of: Estimates) -> str | None:
     spread, (length, what) = of.spread(of.approach), of.range
-    if not of.problem.setting.wall or spread <= SHARE * length or of.problem.alone_for[of.cell] > 0:
+    kept = of.problem.held[of.cell] or of.problem.alone_for[of.cell] > 0
+    if kept or not of.problem.setting.wall or spread <= SHARE * length:
         return None
     way = f"the flow carries it over {APPROACH:g} radii" if of.approach < of.longest else "the run lasts"
     return (
@@ -78,7 +79,7 @@ def _thermal_off(of: Estimates) -> str | None:
 
 def _thermal_on(of: Estimates) -> str | None:
     spread, (length, what) = of.spread(of.longest), of.range
-    if not of.problem.setting.wall or of.shear == 0 or spread >= NEGLIGIBLE * length:
+    if of.problem.held[of.cell] or not of.problem.setting.wall or of.shear == 0 or spread >= NEGLIGIBLE * length:
         return None
     return (
         f"on, but in the whole run the height of {of.name} spreads by {1e3 * spread:.3g} nm, less than a thousandth of "

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from attrs import frozen
 
-from mpad_core.interfaces.errors import InputError
+from mpad_core.interfaces.errors import InputError, PartError
 from mpad_core.physics.auto import Auto
 from mpad_core.physics.problem import Problem
+from mpad_core.records.directory import make_directory, write_whole
 from mpad_core.records.lock import locked
 from mpad_core.records.log import RunLog
 from mpad_core.records.progress import progress, warn
@@ -102,33 +103,39 @@ def run(
     root = FilePath(directory)
     text = resolved_toml(scene)
     todo = list(cases(scene))
-    _make(root)
+    make_directory(root)
     with locked(root):
         choice = _with_choice(scene, root, resume)
         if choice is not scene:
             scene, text, todo = choice, resolved_toml(choice), list(cases(choice))
         _claim(root, scene, text, resume)
-        with RunLog(root / LOG) as log:
-            began = time.monotonic()
-            log.write("started", scene=scene.title, runs=len(todo), resume=resume, solver=scene.solver.parameters)
-            for doubt in warnings_of(scene, todo[0].problem):
-                warn(log, doubt.effect, doubt.text)
-            results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
-            summary = contributions.remembered(_summary(scene, results, time.monotonic() - began), root / SUMMARY)
-            _write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
-            if scene.passage:
-                _draw(scene, results, root / PICTURE)
-            log.write("finished", wall_s=time.monotonic() - began)
+        return _claimed(scene, todo, root, text, resume=resume, checkpoint_every=checkpoint_every)
+
+
+def _claimed(
+    scene: Scene, todo: list[Case], root: FilePath, text: str, *, resume: bool, checkpoint_every: float
+) -> dict[str, Any]:
+    """Run all cases into a directory that is the scene's; give the summary."""
+    with RunLog(root / LOG) as log:
+        began = time.monotonic()
+        log.write("started", scene=scene.title, runs=len(todo), resume=resume, solver=scene.solver.parameters)
+        _warn(scene, todo[0].problem, log)
+        results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
+        summary = contributions.remembered(_summary(scene, results, time.monotonic() - began), root / SUMMARY)
+        write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
+        if scene.passage:
+            _draw(scene, results, root / PICTURE)
+        log.write("finished", wall_s=time.monotonic() - began)
     return summary
 
 
-def _make(root: FilePath) -> None:
+def _warn(scene: Scene, problem: Problem, log: RunLog) -> None:
+    """Say what is doubtful about a scene; doubts that cannot be worked out are no reason not to run it."""
     try:
-        root.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{root}: no directory can be made there ({error.strerror}); choose another with -o"
-        ) from error
+        for doubt in warnings_of(scene, problem):
+            warn(log, doubt.effect, doubt.text)
+    except PartError as error:
+        log.write("warnings not told", why=str(error))
 
 
 def _with_choice(scene: Scene, root: FilePath, resume: bool) -> Scene:
@@ -145,7 +152,7 @@ def _claim(root: FilePath, scene: Scene, text: str, resume: bool) -> None:
         if (root / TRAJECTORY).exists():
             raise InputError(f"{root}: holds a trajectory without its scene; choose another directory with -o")
         _keep_files(root, scene)
-        _write_whole(there, text.encode())
+        write_whole(there, text.encode())
     elif not resume:
         raise InputError(f"{root}: holds a run already; add --resume to go on with it, or choose another with -o")
     elif there.read_bytes() != text.encode():
@@ -160,14 +167,7 @@ def _keep_files(root: FilePath, scene: Scene) -> None:
             raise InputError(f"{file.path}: has changed since the scene was read; start again")
         copy = root / file.kept_as
         copy.parent.mkdir(exist_ok=True)
-        _write_whole(copy, raw)
-
-
-def _write_whole(path: FilePath, raw: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    temporary = path.with_name(path.name + ".tmp")
-    temporary.write_bytes(raw)
-    temporary.replace(path)
+        write_whole(copy, raw)
 
 
 def _run_case(

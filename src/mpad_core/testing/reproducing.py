@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 import tomli_w
 
-from mpad_core.interfaces.values import Configuration, Setting
+from mpad_core.interfaces.values import Configuration
+from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
 from mpad_core.testing.asking import Place
 
@@ -51,12 +51,5 @@ def scene_text(case: "Case", place: Place, law: str, says: str) -> str:
 
 def place_of(scene: Scene) -> Place:
     """Give the fluid and the cells of a scene as a place to ask a solver at."""
-    cells = list(scene.cells.values())
-    centres = np.array([[cell.x, cell.y, scene.height_of(cell)] for cell in cells]).reshape(-1, 3)
-    radii = [scene.kinds[cell.kind].radius for cell in cells]
-    setting = Setting(
-        viscosity=scene.fluid.viscosity,
-        shear_rate=scene.flow.rate if scene.effects.shear != "off" else 0.0,
-        wall=scene.wall is not None and scene.effects.wall != "off",
-    )
-    return Place(setting=setting, at=Configuration(centres=centres, radii=radii))
+    problem = compose(scene)
+    return Place(setting=problem.setting, at=Configuration(centres=problem.start, radii=problem.radii))

@@ -4,6 +4,7 @@ import contextlib
 import io
 import os
 import re
+import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 from attrs import field, frozen
 
-from mpad_core.interfaces.errors import InputError, PartError
+from mpad_core.interfaces.errors import InputError, InterruptedRunError, PartError
 from mpad_core.testing import suite
 from mpad_core.testing.report import Validation, json_text
 from mpad_core.testing.rows import Told, told_of
@@ -64,6 +65,8 @@ def asked(named: Mapping[str, Sequence[str]], at: Path | None) -> Asked:
     at
         A scene, or none.
     """
+    if at is not None and any(named.values()):
+        raise InputError("--at asks the scene's own solver: leave out --solver, --bond, --surface and --force")
     return Asked(chosen=Chosen(names={kind: tuple(named.get(f"{kind}s", ())) for kind in KINDS}), at=at)
 
 
@@ -112,6 +115,8 @@ def validate(asked: Asked) -> Validation:
     listener, said = _Listener(), io.StringIO()
     with _away_from_the_users_settings(), contextlib.redirect_stdout(said):
         code = pytest.main(asked.arguments(), plugins=[listener])
+    if code == pytest.ExitCode.INTERRUPTED:
+        raise InterruptedRunError("interrupted", signal.SIGINT)
     if listener.broken or code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED) or not listener.told:
         last = (listener.broken or said.getvalue().strip().splitlines() or ["no law was asked"])[-1]
         raise PartError(f"the validation suite cannot be run: {' '.join(last.split())[-400:]}")

@@ -1,7 +1,6 @@
 """What a study of cost leaves in its directory: written anew after each row, so that nothing computed is lost."""
 
 import csv
-import errno
 import io
 import json
 import math
@@ -10,8 +9,7 @@ from typing import Any
 
 from attrs import frozen
 
-from mpad_core.interfaces.errors import DiskFullError, InputError
-from mpad_core.records.directory import temporary
+from mpad_core.records.directory import write_whole
 from mpad_core.studies.cost.rows import POSITION, RUN, Row, front
 from mpad_core.studies.measures.estimates import Estimate
 
@@ -35,22 +33,6 @@ class Found:
         return [row for row in self.rows if row.study == study]
 
 
-def make(directory: Path) -> None:
-    """Make the directory, unless it is there.
-
-    Raises
-    ------
-    InputError
-        If it cannot be made.
-    """
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{directory}: no directory can be made there ({error.strerror}); choose another with -o"
-        ) from error
-
-
 def write(found: Found, directory: Path) -> None:
     """Write table and JSON, each whole or not at all."""
     told = records(found)
@@ -63,8 +45,8 @@ def write(found: Found, directory: Path) -> None:
         writer.writerow({key: "" if value is None else value for key, value in (record | values).items()})
     facts = dict(found.facts)
     whole = {"title": found.title, **facts, "rows": told}
-    _write_whole(directory / CSV, text.getvalue())
-    _write_whole(directory / JSON, json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_whole(directory / CSV, text.getvalue().encode())
+    write_whole(directory / JSON, (json.dumps(whole, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode())
 
 
 def records(found: Found) -> list[dict[str, Any]]:
@@ -94,13 +76,3 @@ def _number(value: float) -> float | None:
 
 def _estimate(value: Estimate) -> dict[str, float | None]:
     return {"value": _number(value.value), "low": _number(value.low), "high": _number(value.high)}
-
-
-def _write_whole(path: Path, text: str) -> None:
-    try:
-        temporary(path).write_text(text, encoding="utf-8")
-        temporary(path).replace(path)
-    except OSError as error:
-        if error.errno == errno.ENOSPC:
-            raise DiskFullError(f"{path}: no room on the disk") from error
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place with -o") from error

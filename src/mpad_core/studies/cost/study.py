@@ -7,10 +7,12 @@ from pathlib import Path
 
 from attrs import evolve, frozen
 
-from mpad_core.interfaces.errors import InterruptedRunError, RefusedError
+from mpad_core.interfaces.errors import InputError, InterruptedRunError, RefusedError
 from mpad_core.physics.levels import Level, installed_levels
+from mpad_core.records.directory import make_directory
+from mpad_core.running.choosing import settled
 from mpad_core.scene.spec import Scene
-from mpad_core.studies.cost.files import PICTURE, Found, make, write
+from mpad_core.studies.cost.files import PICTURE, Found, write
 from mpad_core.studies.cost.long import long_runs
 from mpad_core.studies.cost.paths import AtPlaces
 from mpad_core.studies.cost.rows import LONG, POSITION, RATE, RUN, SOLVE, Row
@@ -83,8 +85,12 @@ def cost(
     """
     asked, home = options or Options(), Path(directory)
     levels = installed_levels(asked.solvers or None)
-    make(home)
+    if not levels:
+        raise InputError(f"--solver {', '.join(asked.solvers)}: stands for others; name those, or leave it out")
+    make_directory(home)
+    scene = settled(scene)
     found = Found(title=scene.title)
+    write(found, home)  # whether it can be written shows at once
     try:
         for part in _parts(scene, levels, asked, say):
             found = _joined(found, part)

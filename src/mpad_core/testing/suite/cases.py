@@ -69,7 +69,7 @@ def cases(kind: str, chosen: Chosen) -> list[Case]:
     for name in chosen.of(kind):
         try:
             found += _levels(name) if kind == "solver" else _samples(kind, name)
-        except MpadError:
+        except (MpadError, TypeError, ValueError):  # the last two from making a solver with its defaults
             continue
     return found
 
