@@ -13,7 +13,9 @@ from mpad_core.numerics.compiled import compiled
 from mpad_core.physics.measures import hazards
 from mpad_core.physics.wall_density import AHEAD, STEP, UNTOLD, contact_half_width, densities, rasters
 from mpad_core.plugins.registry import load
-from mpad_core.running.densities import density_at, holds
+from mpad_core.running.densities import density_at
+from mpad_core.running.densities import holds as windows_hold
+from mpad_core.running.layout import Binding
 
 REACH = np.array([0.031])
 
@@ -50,6 +52,11 @@ class Faulty(Wavy):
 def on(problem: Any, species: Any, surface: Surface, centres: Any, **words: Any) -> Any:
     """A problem of cells at centres with bonds to a surface."""
     return problem(centres, species=(evolve(species("bell"), surface=surface, **words),))
+
+
+def holds(found: Any, cell: int, x: float, y: float) -> bool:
+    """Tell whether a cell's windows hold all; nothing else of what binds matters."""
+    return windows_hold(Binding(*[found if name == "densities" else 0.0 for name in Binding._fields]), cell, x, y)
 
 
 @compiled

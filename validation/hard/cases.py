@@ -10,7 +10,7 @@ from attrs import evolve, field, frozen
 
 from mpad_core import solver
 from mpad_core.interfaces.errors import MpadError
-from mpad_core.interfaces.mobility import MobilitySolver
+from mpad_core.interfaces.mobility import Laddered, MobilitySolver
 from mpad_core.plugins.registry import installed
 
 HOLDS, REFUSED, FAILS = "holds", "refused", "fails"
@@ -66,7 +66,10 @@ def judged(faults: list[str], **numbers: Any) -> Outcome:
 
 
 def solvers() -> dict[str, MobilitySolver]:
-    """Give every column of the tables: the built-in solvers at their levels, and whatever else is installed."""
+    """Give every column of the tables: the built-in solvers at their levels, and whatever else is installed.
+
+    Who stands for others (`Laddered`) answers by one of these, and has no column.
+    """
     columns = {
         "isolated": solver("isolated"),
         "rpb": solver("rpb"),
@@ -78,4 +81,5 @@ def solvers() -> dict[str, MobilitySolver]:
         "elements 96": solver("cdl-biem", discretisation="elements", elements=96),
     }
     known = {chosen.name for chosen in columns.values()}
-    return columns | {part.name: solver(part.name) for part in installed("solver") if part.name not in known}
+    others = {part.name: solver(part.name) for part in installed("solver") if part.name not in known}
+    return columns | {name: other for name, other in others.items() if not isinstance(other, Laddered)}

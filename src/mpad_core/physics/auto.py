@@ -47,10 +47,10 @@ class Auto:
     name: ClassVar[str] = "auto"
     traits: ClassVar[SolverTraits] = SolverTraits(
         lubrication=True,
-        levels=tuple(AccuracyLevel(parameters=(("accuracy", x),), error=x) for x in (1e-2, 1e-3)),
+        levels=(AccuracyLevel(parameters=(("accuracy", 1e-2),), error=1e-2),),
     )
 
-    accuracy: float = field(default=1e-3, validator=[validators.ge(1e-6), validators.le(0.5)])
+    accuracy: float = field(default=1e-2, validator=[validators.ge(1e-6), validators.le(0.5)])
     levels: tuple[str, ...] = ()
     trust: tuple[float, ...] = field(default=())
     reason: str = ""
@@ -61,6 +61,11 @@ class Auto:
             raise ValueError(
                 f"trust must be one positive number for each of the {len(self.levels)} levels, not {value}"
             )
+
+    @property
+    def tolerance(self) -> float:
+        """Residual to which the least careful of its levels iterates."""
+        return max(float(getattr(rung.solver, "tolerance", 0.0)) for rung in self.rungs())
 
     def rungs(self) -> tuple[Rung, ...]:
         """Give the levels to be tried, in this order.
@@ -95,16 +100,6 @@ class Auto:
         """Give the chosen solver's answer; its guess is of no use to another, and left out."""
         motion = prepared.solver.solve(prepared.inner, loads)
         return Motion(velocity=motion.velocity, report=motion.report)
-
-    def root(self, prepared: Any, noise: Array) -> Array:
-        """Multiply noise with the chosen solver's root of the mobility."""
-        root: Array = prepared.solver.root(prepared.inner, noise)
-        return root
-
-    def drift(self, prepared: Any, noise: Array | None = None) -> Array:
-        """Give the divergence of the chosen solver's mobility."""
-        drift: Array = prepared.solver.drift(prepared.inner, noise)
-        return drift
 
 
 def _worth_trying(accuracy: float) -> list[Level]:

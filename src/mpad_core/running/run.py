@@ -27,7 +27,7 @@ from mpad_core.running.recorder import (
     close_observers,
     go_on_recording,
 )
-from mpad_core.running.stopping import Signals, StopWhen, first_that_holds, listening
+from mpad_core.running.stopping import Signals, StopWhen, first_that_holds
 
 CHECKPOINT_EVERY = 2.0  # s of wall time
 
@@ -63,7 +63,16 @@ class _Listeners:
     bar: Progress
 
 
-def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Progress) -> Outcome:
+@frozen(kw_only=True)
+class Session:
+    """What the single runs of a process share."""
+
+    log: RunLog
+    signals: Signals  # heard from before the first one
+    resume: bool  # go on with what is there
+
+
+def run_one(order: Order, directory: Path, session: Session, bar: Progress) -> Outcome:
     """Run into a directory, whose lock the caller holds, or go on with what is there.
 
     Raises
@@ -78,16 +87,15 @@ def run_one(order: Order, directory: Path, *, resume: bool, log: RunLog, bar: Pr
         With a checkpoint written where there was room.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    with listening() as signals:
-        with _named_parts(order.problem, "before step one"):
-            machine = make_ready(order.problem)
-            recorder, state, ended = _begin(order, machine, directory, resume, signals, log)
-        listeners = _Listeners(recorder=recorder, accounts=Accounts.of(machine), signals=signals, bar=bar)
-        with _closed(recorder):
-            state, ended = _go_on(order, listeners, state, ended)
+    with _named_parts(order.problem, "before step one"):
+        machine = make_ready(order.problem)
+        recorder, state, ended = _begin(order, machine, directory, session)
+    listeners = _Listeners(recorder=recorder, accounts=Accounts.of(machine), signals=session.signals, bar=bar)
+    with _closed(recorder):
+        state, ended = _go_on(order, listeners, state, ended)
     account = listeners.accounts.closed()
     if account.fault:
-        log.write("shares of effects not told", why=account.fault)
+        session.log.write("shares of effects not told", why=account.fault)
     return Outcome(state=state, ended=ended, sub_step=machine.pace.sub_step, account=account)
 
 
@@ -122,16 +130,14 @@ def _closed(recorder: Recorder) -> Iterator[None]:
         close_observers(recorder.recording.observers)
 
 
-def _begin(
-    order: Order, machine: Machine, directory: Path, resume: bool, signals: Signals, log: RunLog
-) -> tuple[Recorder, State, str]:
+def _begin(order: Order, machine: Machine, directory: Path, session: Session) -> tuple[Recorder, State, str]:
     """Give the recorder, the state to march from (a checkpoint's, or time zero's), and why the run is over if it is."""
     checkpoint = directory / CHECKPOINT
-    if not resume and (checkpoint.exists() or (directory / TRAJECTORY).exists()):
+    if not session.resume and (checkpoint.exists() or (directory / TRAJECTORY).exists()):
         raise InputError(f"{directory}: holds a run already; add --resume to go on with it, or choose another with -o")
     if not checkpoint.exists():
-        log.write("preparing", run=directory.name, cells=order.problem.names)
-        state = _prepared(machine, signals)
+        session.log.write("preparing", run=directory.name, cells=order.problem.names)
+        state = _prepared(machine, session.signals)
         return begin_recording(order.recording, machine, directory, state), state, ""
     kept = read_checkpoint(checkpoint)
     try:
@@ -141,7 +147,7 @@ def _begin(
             raise ValueError(f"it ended by {str(ended)!r}")
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise InputError(f"{checkpoint}: does not fit the scene ({one_line(error)}); start anew with -o") from error
-    log.write("resumed", run=directory.name, simulated=state.time)
+    session.log.write("resumed", run=directory.name, simulated=state.time)
     return go_on_recording(order.recording, order.problem, directory, kept), state, str(ended)
 
 

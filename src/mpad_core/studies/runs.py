@@ -3,7 +3,8 @@
 import hashlib
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from os import PathLike
 from pathlib import Path as FilePath
 from typing import Any
@@ -22,8 +23,9 @@ from mpad_core.records.reader import read_trajectory
 from mpad_core.records.trajectory import Trajectory
 from mpad_core.running.choosing import kept_choice, settled
 from mpad_core.running.recorder import TRAJECTORY, Recording
-from mpad_core.running.run import CHECKPOINT_EVERY, Order, Outcome, run_one
+from mpad_core.running.run import CHECKPOINT_EVERY, Order, Outcome, Session, run_one
 from mpad_core.running.schedules import Cadence
+from mpad_core.running.stopping import listening
 from mpad_core.scene.attached import files_of
 from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
@@ -109,18 +111,22 @@ def run(
         if choice is not scene:
             scene, text, todo = choice, resolved_toml(choice), list(cases(choice))
         _claim(root, scene, text, resume)
-        return _claimed(scene, todo, root, text, resume=resume, checkpoint_every=checkpoint_every)
+        return _claimed(scene, todo, root, partial(_order, scene, text, checkpoint_every), resume)
 
 
 def _claimed(
-    scene: Scene, todo: list[Case], root: FilePath, text: str, *, resume: bool, checkpoint_every: float
+    scene: Scene, todo: list[Case], root: FilePath, ordered: Callable[[Case], Order], resume: bool
 ) -> dict[str, Any]:
     """Run all cases into a directory that is the scene's; give the summary."""
     with RunLog(root / LOG) as log:
         began = time.monotonic()
         log.write("started", scene=scene.title, runs=len(todo), resume=resume, solver=scene.solver.parameters)
-        _warn(scene, todo[0].problem, log)
-        results = [_run_case(scene, text, case, root, resume, checkpoint_every, log) for case in todo]
+        with listening() as signals:
+            _warn(scene, todo[0].problem, log)
+            results = [
+                _run_case(case, ordered(case), root / case.folder, Session(log=log, signals=signals, resume=resume))
+                for case in todo
+            ]
         summary = contributions.remembered(_summary(scene, results, time.monotonic() - began), root / SUMMARY)
         write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
         if scene.passage:
@@ -170,18 +176,14 @@ def _keep_files(root: FilePath, scene: Scene) -> None:
         write_whole(copy, raw)
 
 
-def _run_case(
-    scene: Scene, text: str, case: Case, root: FilePath, resume: bool, checkpoint_every: float, log: RunLog
-) -> Result:
-    folder = root / case.folder
-    order = _order(scene, text, case, checkpoint_every)
-    with progress(order.until, log=log) as bar:
-        outcome = run_one(order, folder, resume=resume, log=log, bar=bar)
-    log.write("run ended", run=case.folder or ".", ended=outcome.ended, simulated=outcome.state.time)
+def _run_case(case: Case, order: Order, folder: FilePath, session: Session) -> Result:
+    with progress(order.until, log=session.log) as bar:
+        outcome = run_one(order, folder, session, bar)
+    session.log.write("run ended", run=case.folder or ".", ended=outcome.ended, simulated=outcome.state.time)
     return Result(case=case, outcome=outcome, trajectory=read_trajectory(folder / TRAJECTORY))
 
 
-def _order(scene: Scene, text: str, case: Case, checkpoint_every: float) -> Order:
+def _order(scene: Scene, text: str, checkpoint_every: float, case: Case) -> Order:
     problem, every = case.problem, scene.record.every
     followed = (
         scene.passage.cell

@@ -58,6 +58,7 @@ height = "5.4 um"
 [cells.b]
 kind = "bead"
 x = "-14 um"
+y = "11 um"
 height = "6 um"
 """
 
