@@ -35,10 +35,10 @@ _HEAD = """\
 # Hard cases
 
 What solvers and runs do where they are pushed to, and over, the edge: the radius is a, gaps are between smooth
-surfaces. Every case is asked of every built-in solver; what must hold is in the first column of the tables below. A
-case *holds*, or is *refused* in one clear line that names the sphere or cell and the number, before anything wrong is
-computed or stored. `pytest validation/hard` asks the cheap ones, `benchmarks/hard_cases.py --docs docs/hard-cases.md`
-asks all and writes this page.
+surfaces. Every case is asked of every built-in solver (`auto` answers by one of them); what must hold is in the first
+column of the tables below. A case *holds*, or is *refused* in one clear line that names the sphere or cell and the
+number, before anything wrong is computed or stored. `pytest validation/hard` asks the cheap ones,
+`benchmarks/hard_cases.py --docs docs/hard-cases.md` asks all and writes this page.
 
 The mobility counts in Stokes' units, 1/(6πηa) and 1/(8πηa³). Spheres are free in shear, pulled down by a weight as
 strong as the shear. The error found is that against `cdl-biem` at 1e-4; it must be within three times what the solver
