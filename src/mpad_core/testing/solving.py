@@ -82,7 +82,8 @@ class SolvingContract(AskedSolver):
             forces=forces, held=[1],
         )  # fmt: skip
         assert (moved[1] == 0).all()
-        matrix, free = self.matrix(setting, at), self.free(setting, at).ravel()
+        free = self.free(setting, at).ravel()
+        matrix = self.motion(setting, at, np.eye(12).reshape(2, 6, 12)).velocity.reshape(12, 12) - free[:, None]
         load = np.zeros(12)
         load[:3] = forces[0]
         load[6:] = np.linalg.solve(matrix[6:, 6:], -(free[6:] + matrix[6:, :6] @ load[:6]))
