@@ -57,6 +57,23 @@ class Signals:
 
 
 @contextmanager
+def interruptible() -> Iterator[None]:
+    """Let SIGINT and SIGTERM end, at once, what nobody can go on with later."""
+    try:
+        before = {
+            number: signal.signal(number, signal.default_int_handler) for number in (signal.SIGINT, signal.SIGTERM)
+        }
+    except ValueError:  # only the main thread may set handlers
+        yield
+        return
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
 def listening() -> Iterator[Signals]:
     """Turn SIGINT and SIGTERM into a note, while the block lasts; outside the main thread nothing is heard."""
     heard = Signals()

@@ -25,7 +25,7 @@ from mpad_core.running.choosing import kept_choice, settled
 from mpad_core.running.recorder import TRAJECTORY, Recording
 from mpad_core.running.run import CHECKPOINT_EVERY, Order, Outcome, Session, run_one
 from mpad_core.running.schedules import Cadence
-from mpad_core.running.stopping import listening
+from mpad_core.running.stopping import interruptible, listening
 from mpad_core.scene.attached import files_of
 from mpad_core.scene.compose import compose
 from mpad_core.scene.spec import Scene
@@ -105,33 +105,31 @@ def run(
     root = FilePath(directory)
     text = resolved_toml(scene)
     todo = list(cases(scene))
-    make_directory(root)
-    with locked(root):
-        choice = _with_choice(scene, root, resume)
-        if choice is not scene:
-            scene, text, todo = choice, resolved_toml(choice), list(cases(choice))
-        _claim(root, scene, text, resume)
-        return _claimed(scene, todo, root, partial(_order, scene, text, checkpoint_every), resume)
+    with listening() as signals:
+        make_directory(root)
+        with locked(root):
+            choice = _with_choice(scene, root, resume)
+            if choice is not scene:
+                scene, text, todo = choice, resolved_toml(choice), list(cases(choice))
+            _claim(root, scene, text, resume)
+            with RunLog(root / LOG) as log:
+                session = Session(log=log, signals=signals, resume=resume)
+                return _claimed(scene, todo, root, partial(_order, scene, text, checkpoint_every), session)
 
 
 def _claimed(
-    scene: Scene, todo: list[Case], root: FilePath, ordered: Callable[[Case], Order], resume: bool
+    scene: Scene, todo: list[Case], root: FilePath, ordered: Callable[[Case], Order], session: Session
 ) -> dict[str, Any]:
     """Run all cases into a directory that is the scene's; give the summary."""
-    with RunLog(root / LOG) as log:
-        began = time.monotonic()
-        log.write("started", scene=scene.title, runs=len(todo), resume=resume, solver=scene.solver.parameters)
-        with listening() as signals:
-            _warn(scene, todo[0].problem, log)
-            results = [
-                _run_case(case, ordered(case), root / case.folder, Session(log=log, signals=signals, resume=resume))
-                for case in todo
-            ]
-        summary = contributions.remembered(_summary(scene, results, time.monotonic() - began), root / SUMMARY)
-        write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
-        if scene.passage:
-            _draw(scene, results, root / PICTURE)
-        log.write("finished", wall_s=time.monotonic() - began)
+    began, log = time.monotonic(), session.log
+    log.write("started", scene=scene.title, runs=len(todo), resume=session.resume, solver=scene.solver.parameters)
+    _warn(scene, todo[0].problem, log)
+    results = [_run_case(case, ordered(case), root / case.folder, session) for case in todo]
+    summary = contributions.remembered(_summary(scene, results, time.monotonic() - began), root / SUMMARY)
+    write_whole(root / SUMMARY, (json.dumps(summary, indent=2, ensure_ascii=False) + "\n").encode())
+    if scene.passage:
+        _draw(scene, results, root / PICTURE)
+    log.write("finished", wall_s=time.monotonic() - began)
     return summary
 
 
@@ -148,7 +146,8 @@ def _with_choice(scene: Scene, root: FilePath, resume: bool) -> Scene:
     """Give the scene with the solver that it leaves open: that of the run to be resumed, or a new choice."""
     if (root / SCENE).exists():
         return kept_choice(scene, root / SCENE) if resume else scene
-    return settled(scene)
+    with interruptible():
+        return settled(scene)
 
 
 def _claim(root: FilePath, scene: Scene, text: str, resume: bool) -> None:

@@ -20,11 +20,11 @@ from mpad_core.numerics.neighbours import closest_pair
 
 SHARE = 0.045
 
-FAR = 700.0
+FAR = 550.0
 """What far spheres leave out falls as the cube of the distance, in smaller radii, from which on they are far.
 
 Measured for eight to twelve spheres at gaps of 1e-3 to 1 and of 0.3 to 6, with reaches of 1.5, 4 and 8; and such that
-no pair just beyond a reach of 1.5 errs by more than four times the estimate.
+no pair just beyond a reach of 1.5 errs by more than six times the estimate.
 """
 
 LEAST = 1e-10
