@@ -7,6 +7,7 @@ from types import FrameType
 
 from attrs import define, frozen
 
+from mpad_core.interfaces.errors import InterruptedRunError
 from mpad_core.physics.measures import dx_of
 from mpad_core.physics.problem import Problem
 from mpad_core.physics.state import State
@@ -58,11 +59,19 @@ class Signals:
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Let SIGINT and SIGTERM end, at once, what nobody can go on with later."""
+    """Let SIGINT and SIGTERM end, at once, what nobody can go on with later.
+
+    Raises
+    ------
+    InterruptedRunError
+        When one of them comes.
+    """
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise InterruptedRunError("interrupted before the run began; start anew", number)
+
     try:
-        before = {
-            number: signal.signal(number, signal.default_int_handler) for number in (signal.SIGINT, signal.SIGTERM)
-        }
+        before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     except ValueError:  # only the main thread may set handlers
         yield
         return
