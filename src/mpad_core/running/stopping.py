@@ -67,8 +67,11 @@ def interruptible() -> Iterator[None]:
         When one of them comes.
     """
 
+    heard: list[int] = []
+
     def end(number: int, frame: FrameType | None) -> None:
-        raise InterruptedRunError("interrupted before the run began; start anew", number)
+        heard.append(number)
+        raise KeyboardInterrupt  # which no part can take for a fault of its own
 
     try:
         before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -77,6 +80,9 @@ def interruptible() -> Iterator[None]:
         return
     try:
         yield
+    except KeyboardInterrupt:
+        number = heard[-1] if heard else signal.SIGINT
+        raise InterruptedRunError("interrupted before the run began; start anew", number) from None
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

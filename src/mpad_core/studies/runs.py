@@ -146,6 +146,8 @@ def _with_choice(scene: Scene, root: FilePath, resume: bool) -> Scene:
     """Give the scene with the solver that it leaves open: that of the run to be resumed, or a new choice."""
     if (root / SCENE).exists():
         return kept_choice(scene, root / SCENE) if resume else scene
+    if scene.solver.name != Auto.name:
+        return scene
     with interruptible():
         return settled(scene)
 
