@@ -9,6 +9,7 @@ from attrs import evolve, frozen
 from mpad_core.arrays import Array
 from mpad_core.interfaces.mobility import MobilitySolver
 from mpad_core.interfaces.values import Configuration, Motion, Setting
+from mpad_core.physics.levels import relative_error
 
 SHEAR = Setting(viscosity=1.3, shear_rate=2.0)
 
@@ -128,10 +129,5 @@ def several(at: Configuration) -> bool:
 
 
 def relative(found: Array, expected: Array, radii: Array) -> float:
-    """Give the relative 2-norm error of (U, aΩ): "the error" everywhere here."""
-    found, expected = np.atleast_2d(found), np.atleast_2d(expected)
-    weights = np.ones((len(radii), 6))
-    weights[:, 3:] = radii[:, None]
-    size = np.linalg.norm(weights * expected)
-    wrong = np.linalg.norm(weights * (found - expected))
-    return float(wrong / size) if size > 0 else float(wrong)
+    """Give the error of one sphere's velocities (6,) or of several spheres', see `mpad_core.physics.levels`."""
+    return relative_error(np.atleast_2d(found), np.atleast_2d(expected), radii)
